@@ -1,0 +1,231 @@
+"""Limit analysis: an upper bound of the factor of safety by linear programming.
+
+A scene can only be in equilibrium with its strength divided by F if there are contact forces that
+balance every block and respect the strength of every joint, whatever the stiffnesses. Whether there
+are any is a linear program. If there are none, equilibrium is impossible: failure is proved. If
+there are some, nothing is proved, because joints cannot choose their forces: they follow from the
+displacements, and joints that dilate less than their friction angle may fail before (non-associated
+flow). For friction alone the gap is 4 to 17 % on slopes of rock; an equilibrium that was found is
+the proof on that side.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, diags, hstack, vstack
+
+import jointlaw as jl
+
+from ..contact import Contacts, Tracker
+from ..dynamics.blocks import Blocks, press
+from ..dynamics.timestep import rates
+from ..output.monitors import slip_distance
+from ..scene import Law, Scene
+
+SMALLEST_FACTOR, LARGEST_FACTOR = 1 / 64, 64.0
+TOLERANCE = 1e-3  # of the factor
+STRESSES = 7  # at which the strength of a rough law gets a tangent
+STRESS_RANGE = 1e-3, 3.0  # of the largest overburden stress: where they lie
+SLOPE_STEP = 1.05  # ratio of the two stresses that give a tangent
+INFEASIBLE = 2  # status of scipy.optimize.linprog
+
+
+class Strength(NamedTuple):
+    """Strength of a joint: |shear stress| <= cohesion + friction * normal stress, for every line,
+    and normal stress >= -tension (Pa)."""
+
+    cohesion: np.ndarray  # (lines,) in Pa
+    friction: np.ndarray  # (lines,)
+    tension: float
+
+
+class ForceBalance(NamedTuple):
+    """Equations and strengths of a scene's contacts that bear forces.
+
+    normal, shear (m, n): generalised forces on the m free motions by unit forces of n contacts;
+    load (m,): of weight, loads and water; area (n,) in m2; law (n,): number of each one's law.
+    """
+
+    normal: csr_array
+    shear: csr_array
+    load: np.ndarray
+    area: np.ndarray
+    law: np.ndarray
+    strengths: Sequence[Strength]
+
+
+def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBalance:
+    """The balance of a scene as drawn, without the equations of `excluded` blocks (blocks,)."""
+    blocks = Blocks(scene)
+    tracker = Tracker(scene, blocks.motion)
+    tracker.renew(blocks.motion, blocks.near())
+    press(scene, blocks, tracker)
+    contacts: Contacts = tracker.contacts
+    bearing = np.flatnonzero(contacts.length > 1e-9 * contacts.length.max(initial=0.0))
+    count = len(contacts.length)
+    motions = rates(blocks, contacts).T.tocsr()  # (free motions, 2 contacts)
+    load = ((blocks.gravity + blocks.loads) * blocks.root)[blocks.free]
+    if excluded is not None:
+        block_of_motion = np.nonzero(blocks.free)[0]
+        kept = ~excluded[block_of_motion]
+        motions, load = motions[kept], load[kept]
+    stress = overburden_stress(scene)
+    strengths = [strength_of(law, stress) for law in scene.laws.values()]
+    return ForceBalance(
+        motions[:, bearing],
+        motions[:, count + bearing],
+        load,
+        contacts.length[bearing] * scene.thickness,
+        tracker.law[bearing],
+        strengths,
+    )
+
+
+def overburden_stress(scene: Scene) -> float:
+    """Scale (Pa) of the stresses in a scene: the weight of a column of its height, or its in-situ
+    stress if that is larger."""
+    corners = np.concatenate([block.corners for block in scene.blocks])
+    height = float(np.ptp(corners, axis=0).max())
+    density = max(block.section.mass / block.section.area for block in scene.blocks)
+    weight = density * float(np.hypot(*scene.gravity)) * height
+    if scene.in_situ is None:
+        return weight
+    deepest = float(scene.in_situ.signed(corners @ [1, 1j]).max())
+    return max(weight, float(np.abs(scene.in_situ.tensor).max()) * deepest)
+
+
+def strength_of(law: Law, stress: float) -> Strength:
+    """Strength of a law, for stresses of the order of `stress` (Pa).
+
+    Of a rough law: tangents of its peak strength in direct shear. It is a concave function of the
+    normal stress, so that tangents lie above it and the bound stays a bound.
+    """
+    if isinstance(law, jl.CoulombLaw):
+        return Strength(np.array([law.cohesion]), np.array([law.friction]), law.tension)
+    low, high = (share * stress for share in STRESS_RANGE)
+    stresses = np.geomspace(low, high, STRESSES)
+    peaks = np.array([peak_strength(law, s) for s in stresses])
+    beside = np.array([peak_strength(law, SLOPE_STEP * s) for s in stresses])
+    friction = (beside - peaks) / ((SLOPE_STEP - 1.0) * stresses)
+    return Strength(peaks - friction * stresses, friction, law.bond.tension if law.bond else 0.0)
+
+
+def peak_strength(law: jl.JointLaw, stress: float) -> float:
+    """Largest shear stress (Pa) of direct shear at a normal stress (Pa)."""
+    slip = slip_distance(law)
+    to = [1.2 * slip]
+    if law.bond:  # a brittle bond peaks early
+        to = sorted([min(1.01 / law.bond.limits[1][1], slip), 1.2 * slip])
+    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
+    return float(np.abs(record.shear_stress).max())
+
+
+def can_balance(balance: ForceBalance, factor: float) -> bool:
+    """Whether there are contact forces that balance all blocks with the strength divided by factor.
+
+    Unknowns of each contact: the normal force above -tension, N + T = p + q with p, q >= 0, and the
+    shear force (mu/F) (p - q) + s with |s| bounded by the rest of the cohesion. They respect the
+    steepest line of its strength by themselves; further lines are inequalities. Raises RuntimeError
+    where the solver decides nothing.
+    """
+    scale = np.abs(balance.load).max()
+    if not scale:
+        return True
+    area, law = balance.area / scale, balance.law
+    first = [strength.friction.argmax() for strength in balance.strengths]
+    pairs = list(zip(balance.strengths, first, strict=True))
+    slope = np.array([strength.friction[i] for strength, i in pairs])[law] / factor
+    free = np.isinf(slope)  # such a joint never slides
+    slope = np.where(free, 0.0, slope)
+    cohesion = np.array([strength.cohesion[i] for strength, i in pairs])[law] * area / factor
+    tension = np.array([strength.tension for strength in balance.strengths])[law] * area / factor
+    rest = np.where(free, np.inf, np.maximum(cohesion - slope * tension, 0.0))
+    count, cohesive = len(area), np.flatnonzero(rest > 0)
+    sliding = balance.shear @ diags(slope)
+    equations = hstack(
+        [balance.normal + sliding, balance.normal - sliding, balance.shear[:, cohesive]]
+    ).tocsr()
+    right = -balance.load / scale + balance.normal @ tension
+    bounds = np.zeros((equations.shape[1], 2))
+    bounds[: 2 * count, 1] = np.inf
+    bounds[2 * count :] = np.stack([-rest[cohesive], rest[cohesive]], axis=1)
+    rows, limits = _further_lines(balance, first, factor, area, slope, tension, cohesive)
+    for method in ("highs-ipm", "highs-ds"):
+        found = linprog(
+            np.zeros(equations.shape[1]), A_ub=rows, b_ub=limits, A_eq=equations, b_eq=right,
+            bounds=bounds, method=method,
+        )  # fmt: skip
+        if found.status in (0, INFEASIBLE):
+            return found.status == 0
+    raise RuntimeError(f"limit analysis at a factor of {factor:.4g}: {found.message}")
+
+
+def _further_lines(balance, first, factor, area, slope, tension, cohesive):
+    """Rows and bounds of |S| <= (c + mu N)/F for all lines but the first of each contact."""
+    count = len(area)
+    place = np.full(count, -1)
+    place[cohesive] = 2 * count + np.arange(len(cohesive))
+    rows, limits = [], []
+    for number, strength in enumerate(balance.strengths):
+        contacts = np.flatnonzero(balance.law == number)
+        for line in range(len(strength.friction)):
+            if line == first[number] or not len(contacts):
+                continue
+            k = np.arange(len(contacts))
+            mu = strength.friction[line] / factor
+            bound = strength.cohesion[line] * area[contacts] / factor - mu * tension[contacts]
+            has_rest = place[contacts] >= 0
+            for sign in (1.0, -1.0):
+                entries = [
+                    (k, contacts, sign * slope[contacts] - mu),
+                    (k, count + contacts, -sign * slope[contacts] - mu),
+                    (k[has_rest], place[contacts[has_rest]], np.full(has_rest.sum(), sign)),
+                ]
+                row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+                shape = (len(contacts), 2 * count + len(cohesive))
+                rows.append(csr_array((value, (row, column)), shape=shape))
+                limits.append(bound)
+    if not rows:
+        return None, None
+    return vstack(rows).tocsr(), np.concatenate(limits)
+
+
+def limit_factor(scene: Scene, excluded: np.ndarray | None = None) -> float | None:
+    """Upper bound of the factor of safety of a scene, to 0.1 %.
+
+    With its strength divided by this factor no contact forces balance the blocks: failure is
+    proved. `excluded` (blocks,) need no balance. None where forces are found even at 1/64 of the
+    strength, 0.0 where none are found with 64 times the strength.
+    """
+    balance = force_balance(scene, excluded)
+    low, high = SMALLEST_FACTOR, LARGEST_FACTOR
+    factor, step = 1.0, 2.0
+    if can_balance(balance, factor):
+        low = factor
+        while factor < LARGEST_FACTOR:
+            factor = min(factor * step, LARGEST_FACTOR)
+            if not can_balance(balance, factor):
+                high = factor
+                break
+            low = factor
+        else:
+            return None
+    else:
+        high = factor
+        while factor > SMALLEST_FACTOR:
+            factor = max(factor / step, SMALLEST_FACTOR)
+            if can_balance(balance, factor):
+                low = factor
+                break
+            high = factor
+        else:
+            return 0.0
+    while high > (1.0 + TOLERANCE) * low:
+        factor = float(np.sqrt(low * high))
+        if can_balance(balance, factor):
+            low = factor
+        else:
+            high = factor
+    return high

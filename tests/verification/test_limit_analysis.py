@@ -1,0 +1,113 @@
+"""Limit analysis against closed forms: a block on a plane with cohesion and tension, a planar slide
+with a tension crack and water, and a law whose strength envelope is curved."""
+
+import math
+
+import numpy as np
+import pytest
+from scene_text import ROCK, block, coulomb, lines, on_base
+
+import jointlaw as jl
+from dem_demo import parse
+from dem_demo.studies.limit_analysis import limit_factor, peak_strength, strength_of
+
+EXACT = 1.5e-3  # twice what the bisection leaves
+UNIT_WEIGHT = 2600.0 * 9.81
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 2e4])
+@pytest.mark.parametrize("dip", [20.0, 40.0])
+def test_block_on_a_plane(cohesion, dip):
+    scene = parse(on_base(coulomb(0.7, cohesion=cohesion), [3.0, 0.75], dip))
+    weight, angle = UNIT_WEIGHT * 3.0 * 0.75, math.radians(dip)
+    strength = weight * math.cos(angle) * 0.7 + cohesion * 3.0
+    assert limit_factor(scene) == pytest.approx(strength / (weight * math.sin(angle)), rel=EXACT)
+
+
+def test_column_that_tension_keeps_from_toppling():
+    """Its heel carries tension over half of the base: the moment about the toe is that of the
+    tension over the base, as in the discretised joint (two contact points)."""
+    dip, height, width, tension = 25.0, 4.0, 1.0, 1.2e5
+    law = coulomb(0.8, cohesion=2e6, tension=tension)
+    scene = parse(on_base(law, [width, height], dip))
+    angle = math.radians(dip)
+    overturning = UNIT_WEIGHT * width * height * (
+        math.sin(angle) * height / 2 - math.cos(angle) * width / 2
+    )  # fmt: skip
+    by_hand = tension * width**2 / 2 / overturning
+    assert limit_factor(scene) == pytest.approx(by_hand, rel=EXACT)
+
+
+def planar_slide(filled, friction=0.7, cohesion=4e4):
+    """A planar slide of 30 m with a tension crack, and its factor of safety by Hoek and Bray."""
+    height, face, plane, behind = 30.0, math.radians(65), math.radians(38), 8.0
+    crest = (-height / math.tan(face), height)
+    x = crest[0] - behind
+    top, bottom = (x, height), (x, -x * math.tan(plane))
+    crack, length = top[1] - bottom[1], math.hypot(*bottom)
+    level = bottom[1] + filled * crack
+    corners = [(0, 0), crest, top, bottom]
+    edges = zip(corners, [*corners[1:], corners[0]], strict=True)
+    area = 0.5 * abs(sum(p[0] * q[1] - q[0] * p[1] for p, q in edges))
+    weight = UNIT_WEIGHT * area
+    uplift = 0.5 * 9810 * filled * crack * length
+    thrust = 0.5 * 9810 * (filled * crack) ** 2
+    sin, cos = math.sin(plane), math.cos(plane)
+    normal = weight * cos - uplift - thrust * sin
+    shear = weight * sin + thrust * cos
+    text = "[laws.joint]\n" + coulomb(friction, cohesion=cohesion)
+    text += "[laws.crack]\n" + coulomb(0.0)
+    if filled:
+        text += "[water]\n" + lines(table=[[-500, level], [x, level], [0, 0]])
+    text += block(
+        "base", corners=[(-60, -2), (0, -2), (0, 0), bottom, (-60, bottom[1])], fixed=True
+    )
+    text += block("behind", corners=[(-60, bottom[1]), bottom, top, (-60, top[1])], fixed=True)
+    text += block("slide", corners=corners)
+    text += "[[joint]]\n" + lines(between=["slide", "behind"], law="crack")
+    text = 'law = "joint"\n' + text + "[run]\nend = 0.1\n"
+    return parse(text), (cohesion * length + normal * friction) / shear
+
+
+@pytest.mark.parametrize("filled", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("cohesion", [0.0, 4e4])
+def test_planar_slide_with_water(filled, cohesion):
+    scene, by_hand = planar_slide(filled, cohesion=cohesion)
+    assert limit_factor(scene) == pytest.approx(by_hand, rel=EXACT)
+
+
+def test_excluded_blocks_need_no_balance():
+    """A block in the air has no equilibrium; without its equations the other decides."""
+    text = on_base(coulomb(0.7), [3.0, 0.75], 30.0)
+    text = text.replace("[run]", block("falling", box=[0.5, 0.5], at=[0.0, 5.0]) + "[run]")
+    scene = parse(text)
+    assert limit_factor(scene) == 0.0
+    excluded = np.array([block.name == "falling" for block in scene.blocks])
+    by_hand = 0.7 / math.tan(math.radians(30.0))
+    assert limit_factor(scene, excluded) == pytest.approx(by_hand, rel=EXACT)
+
+
+def test_tangents_of_a_rough_law_lie_above_its_strength():
+    law = parse(on_base(ROCK, [3.0, 0.75])).laws["rock"]
+    strength = strength_of(law, 1e5)
+    stresses = np.geomspace(1e3, 1e6, 9)
+    above = (strength.cohesion + np.outer(stresses, strength.friction)).min(axis=1)
+    peaks = np.array([peak_strength(law, stress) for stress in stresses])
+    assert (above > 0.998 * peaks).all()
+    inside = (stresses > 1e2) & (stresses < 3e5)
+    assert (above[inside] < 1.05 * peaks[inside]).all()
+
+
+def test_block_on_a_rough_joint():
+    """Its bound is the strength of the law at its normal stress over its shear stress."""
+    dip, height = math.radians(40.0), 0.75
+    scene = parse(on_base(ROCK, [3.0, height], 40.0))
+    law: jl.JointLaw = scene.laws["rock"]
+    normal, shear = (UNIT_WEIGHT * height * f(dip) for f in (math.cos, math.sin))
+
+    def uneven(share):  # the two ends of the joint bear different stresses
+        return peak_strength(law, normal * (1 + share)) + peak_strength(law, normal * (1 - share))
+
+    arm = height * shear / (3.0 * normal)  # two points, 3 m apart, balance the moment of the weight
+    by_hand = uneven(arm) / (2 * shear)
+    assert limit_factor(scene) == pytest.approx(by_hand, rel=0.01)

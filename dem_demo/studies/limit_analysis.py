@@ -18,8 +18,8 @@ from scipy.sparse import csr_array, diags, hstack, vstack
 
 import jointlaw as jl
 
-from ..contact import Contacts, Tracker
-from ..dynamics.blocks import Blocks, press
+from ..contact import ContactManager, Contacts
+from ..dynamics.blocks import Blocks, apply_loads
 from ..dynamics.timestep import rates
 from ..output.monitors import slip_distance
 from ..scene import Law, Scene
@@ -59,10 +59,10 @@ class ForceBalance(NamedTuple):
 def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBalance:
     """The balance of a scene as drawn, without the equations of `excluded` blocks (blocks,)."""
     blocks = Blocks(scene)
-    tracker = Tracker(scene, blocks.motion)
-    tracker.renew(blocks.motion, blocks.near())
-    press(scene, blocks, tracker)
-    contacts: Contacts = tracker.contacts
+    manager = ContactManager(scene, blocks.motion)
+    manager.renew(blocks.motion, blocks.near())
+    apply_loads(scene, blocks, manager)
+    contacts: Contacts = manager.contacts
     bearing = np.flatnonzero(contacts.length > 1e-9 * contacts.length.max(initial=0.0))
     count = len(contacts.length)
     motions = rates(blocks, contacts).T.tocsr()  # (free motions, 2 contacts)
@@ -78,7 +78,7 @@ def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBala
         motions[:, count + bearing],
         load,
         contacts.length[bearing] * scene.thickness,
-        tracker.law[bearing],
+        manager.law[bearing],
         strengths,
     )
 

@@ -247,7 +247,7 @@ def test_slope_with_rock_bridges_fails_step_by_step_as_its_strength_falls():
     sim = Simulation(replace(weakened(scene, 1.15 * factor), reduction=1.0, run=calm))
     start, moved, broken = sim.blocks.motion[:2].copy(), [], [(sim.joints.damage == 1.0).sum()]
     for below, to in itertools.pairwise([1.0, 0.5 + 0.5 * factor, 0.96 * factor, 1.15 * factor]):
-        for weaker in np.append(np.linspace(below, to, 1000), np.full(1000, to)):
+        for weaker in np.append(np.linspace(below, to, 1000), np.full(3000, to)):
             sim.joints.reduction[1] = weaker  # of the shear strength
             sim.step()
         moved.append(np.abs(sim.blocks.motion[:2] - start).max())

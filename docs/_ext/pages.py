@@ -1,22 +1,46 @@
-"""What differs between a page on GitHub and on the site."""
+"""Differences between a page on GitHub and on the site: links, and the first page."""
 
 import re
 from pathlib import Path
 
-CITED = (Path(__file__).parents[2] / "CITATION.cff").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+CITED = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 REPOSITORY = re.search(r'^repository-code: "(.+)"', CITED, re.MULTILINE)[1]
+README = ROOT / "README.md"
+SHARED = "<!-- end of the first page of the site -->"
+PLACE = "<!-- the first part of README.md -->"
+
+
+def first_part():
+    """README.md up to the mark SHARED, with links relative to docs/."""
+    shared, mark, _ = README.read_text(encoding="utf-8").partition(SHARED)
+    if not mark:
+        raise ValueError(f"{README}: the line {SHARED} is missing; index.md includes what is above")
+    inside = re.sub(r"\]\((?!docs/|\w+:|#)([^)\s]+)\)", r"](../\1)", shared)
+    return inside.replace("](docs/", "](")
+
+
+def links(text):
+    """Lead links to scripts to the pages made from them, and links out of docs/ to the repository.
+
+    The address of the repository is the one in CITATION.cff.
+    """
+    text = text.replace("gallery/GALLERY_HEADER.rst", "examples/index.rst")
+    text = re.sub(r"\]\(gallery\)", "](examples/index.rst)", text)
+    text = re.sub(r"\]\(paper\)", "](figures/index.rst)", text)
+    text = re.sub(r"\]\(gallery/(plot_\w+)\.py\)", r"](examples/\1.rst)", text)
+    text = re.sub(r"\]\(paper/(plot_\w+)\.py\)", r"](figures/\1.rst)", text)
+    text = re.sub(r"\]\(\.\./([\w/.]+\.(?:md|cff))", rf"]({REPOSITORY}/blob/main/\1", text)
+    text = re.sub(r"\]\(\.\./([\w/]+)\)", rf"]({REPOSITORY}/tree/main/\1)", text)
+    return text.replace("https://repository.invalid/jointlaw", REPOSITORY)
 
 
 def read(app, name, source):
-    """Links to scripts of the gallery and of the paper's figures lead to their pages.
-
-    Those to other files lead to the repository, whose address is that of CITATION.cff.
-    """
-    text = source[0].replace("gallery/GALLERY_HEADER.rst", "examples/index.rst")
-    text = re.sub(r"\]\(gallery/(plot_\w+)\.py\)", r"](examples/\1.rst)", text)
-    text = re.sub(r"\]\(paper/(plot_\w+)\.py\)", r"](figures/\1.rst)", text)
-    text = re.sub(r"\]\(\.\./(\w+\.(?:md|cff))", rf"]({REPOSITORY}/blob/main/\1", text)
-    source[0] = text.replace("https://repository.invalid/jointlaw", REPOSITORY)
+    """Put the first part of README.md into index.md and adapt the links of every page."""
+    if name == "index":
+        app.env.note_dependency(README)
+        source[0] = source[0].replace(PLACE, first_part())
+    source[0] = links(source[0])
 
 
 def setup(app):

@@ -45,7 +45,7 @@ for stress in (5e6, 10e6, 20e6):
 
 # %%
 # With the few cells of `balanced` the stiffness is about right, and so is the damping of large
-# cycles. Small cycles have next to none. More depth cells cure it; see *Limits and pitfalls*.
+# cycles. Small cycles have next to none. More depth cells cure it; see *Limitations and pitfalls*.
 
 coarse, softer = cycles(law, 10e6, amplitudes)
 figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")

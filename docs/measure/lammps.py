@@ -72,6 +72,7 @@ OWN = {
     "granular, mindlin": ("off", "pair_style granular\npair_coeff * * hertz/material 1e9 0.5 0.3 "
                           "tangential mindlin NULL 1.0 0.4 damping viscoelastic"),
 }  # fmt: skip
+COULOMB = jl.CoulombLaw(normal_stiffness=1.0e9, shear_stiffness=0.83e9, friction=0.4)
 HEAD = ["pair style, resolution", "contacts", "pair style, ns per contact and step",
         "the same / mindlin", "whole step, ns", "2 processors: pair style, ns",
         "speed-up of the step", "bytes per contact"]  # fmt: skip
@@ -127,13 +128,14 @@ def main():
     where = options.folder
     prepare(where)
     styles, sizes = dict(OWN), {}
-    for r in ("fast", "balanced", "fine"):
-        file = f"rock-{r}.jlaw"
-        (where / file).write_text(table_text(rock(r)))
-        name = f"jointlaw, {r}"
+    laws = {f"jointlaw, {r}": rock(r) for r in ("fast", "balanced", "fine")}
+    laws["jointlaw, Coulomb"] = COULOMB
+    for number_of_law, (name, law) in enumerate(laws.items()):
+        file = f"law-{number_of_law}.jlaw"
+        (where / file).write_text(table_text(law))
         styles[name] = ("on", "plugin load ./jointlawplugin.so\npair_style jointlaw opening 5e-4\n"
                         f"pair_coeff * * {file}")  # fmt: skip
-        sizes[name] = 8 * (rock(r).state_size + 8)
+        sizes[name] = 8 * (law.state_size + 8)
     runs = defaultdict(list)
     for _ in range(options.rounds):
         for name, (newton, style) in styles.items():

@@ -1,7 +1,13 @@
-"""README.md and the pages of the docs: Python and short commands run as printed, all commands
-exist. A page holds what it must: every equation of the paper, every default, links that lead on."""
+"""README.md and the pages of the docs.
 
+Python and short commands run as printed, and all commands exist. The pages are complete: every
+equation of the paper, every default, links whose target exists, terms that a reader searches for,
+error messages as the code has them.
+"""
+
+import ast
 import contextlib
+import importlib.util
 import io
 import re
 import shlex
@@ -42,17 +48,12 @@ def commands(page):
 
 
 ELSEWHERE = {"docs/particles.md"}  # runs in YADE's own Python: tests/hosts/test_yade_table.py
-# the first block of README.md is one line of a host's loop
-GIVEN = {"README.md": lambda: {"joint": jl.presets.load("linear-a3").joint(), "d": [1e-9, 0, 0]}}
-CHECKS = {  # what the names and the printed lines of a page must be
-    "README.md": lambda names, printed: (
-        names["joint"].delta[:2] == pytest.approx([2e-7, 1e-7])
-        and "J/m2 lost to friction" in printed[0]
-    ),
-    "docs/field.md": lambda _, printed: all(line in text("docs/field.md") for line in printed),
+# their examples print something: the page shows the same lines
+SHOW_OUTPUT = ("README.md", "docs/start.md", "docs/field.md")
+CHECKS = {  # of the variables of the examples of a page
     # a point of the data
-    "docs/fits.md": lambda names, _: names["fit"].predict(100e-6) == pytest.approx(6.4e6, rel=0.02),
-    "docs/embed.md": lambda names, _: names["slid"] > 1e-3,  # 41 degrees is beyond its friction
+    "docs/fits.md": lambda names: names["fit"].predict(100e-6) == pytest.approx(6.4e6, rel=0.02),
+    "docs/embed.md": lambda names: names["slid"] > 1e-3,  # 41 degrees is beyond its friction
 }
 QUICK = ("README.md", "docs/start.md", "docs/embed.md")
 
@@ -66,12 +67,16 @@ QUICK = ("README.md", "docs/start.md", "docs/embed.md")
     ],
 )
 def test_blocks_run_as_printed(page):
-    """All of a page in one namespace, as in a notebook."""
-    names, printed = {"__name__": "__main__"} | GIVEN.get(page, dict)(), io.StringIO()
-    with contextlib.redirect_stdout(printed):
+    """All blocks of a page share one namespace, as the cells of a notebook do."""
+    names, output = {"__name__": "__main__"}, io.StringIO()
+    with contextlib.redirect_stdout(output):
         for number, block in enumerate(blocks(page, "python")):
             exec(compile(block, f"{page}, block {number + 1}", "exec"), names)
-    assert page not in CHECKS or CHECKS[page](names, printed.getvalue().splitlines())
+    assert page not in CHECKS or CHECKS[page](names)
+    if page in SHOW_OUTPUT:
+        lines = output.getvalue().splitlines()
+        assert lines
+        assert [line for line in lines if line not in text(page)] == []
 
 
 # by what they begin with: too long for here, and what runs the same instead
@@ -139,13 +144,43 @@ def test_files_for_a_code_host_can_be_read():
     assert set(read["wheels.yml"]["jobs"]) == {"build", "publish"}
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
-def test_a_command_stands_beside_every_number(page):
-    """In the last table of validation.md; code and versions of Python apart."""
+def without_code_and_pictures(markdown):
+    return re.sub(r"```.*?```|!\[[^\]]*\]\([^)]*\)", "", markdown, flags=re.DOTALL)
+
+
+def test_readme_reaches_its_first_command_in_90_words_and_one_number():
+    """Code and pictures are not counted."""
+    opening = without_code_and_pictures(text("README.md").partition("```bash")[0])
+    assert len(re.findall(r"\w[\w'-]*", opening)) <= 90
+    assert len(re.findall(r"\d+(?:\.\d+)*", opening)) <= 1
+
+
+def test_every_number_of_the_readme_has_its_command():
+    """The command is in a table of validation.md; versions of Python are not counted."""
     table = text("docs/validation.md").split("## Numbers of the README")[1].split("##")[0]
-    prose = re.sub(r"```.*?```|`[^`]*`|Python [\d.]+", "", text(page), flags=re.DOTALL)
-    numbers = set(re.findall(r"(?<![\w.])[-+]?\d+\.\d+", prose))
-    assert numbers <= set(re.findall(r"(?<![\w.])[-+]?\d+\.\d+", table))
+    prose = without_code_and_pictures(text("README.md"))
+    prose = re.sub(r"`[^`]*`|Python [\d.]+", "", prose)
+    with_decimals_or_exponent = r"(?<![\w.])\d+(?:\.\d+|(?=e-?\d))(?:e-?\d+)?"
+    numbers = set(re.findall(with_decimals_or_exponent, prose))
+    assert len(numbers) > 5
+    assert numbers <= set(re.findall(with_decimals_or_exponent, table))
+
+
+def test_readme_shares_its_first_part_with_the_first_page_of_the_site():
+    spec = importlib.util.spec_from_file_location("pages", ROOT / "docs" / "_ext" / "pages.py")
+    pages = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pages)
+    assert pages.PLACE in text("docs/index.md")
+    shown = pages.links(pages.first_part())
+    assert blocks("README.md", "python")[0] in shown
+    assert shown.count("```bash") == 2
+    targets = re.findall(r"\]\(([^)#\s]+)", shown)
+    inside = [target for target in targets if "://" not in target and "examples/" not in target]
+    inside = [
+        target for target in inside if not target.startswith("figures/")
+    ]  # made by the gallery
+    assert len(inside) > 20
+    assert [target for target in inside if not (ROOT / "docs" / target).exists()] == []
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -167,7 +202,86 @@ def test_what_a_page_names_exists(page):
 
 
 @pytest.mark.parametrize("one", [one for one in fields(Run) if one.default not in (MISSING, None)])
-def test_the_page_tells_the_default_of_each_key_of_a_run(one):
+def test_the_page_gives_the_default_of_each_key_of_a_run(one):
     keys = text("docs/blocks.md").partition("## The keys of")[2]
     (row,) = re.findall(rf"^\|.*`{one.name}`.*\|.*$", keys, re.MULTILINE)
     assert f"({str(one.default).lower()})" in row
+
+
+TERMS = (
+    """
+GPU, CUDA, OpenMP, threads, benchmark, tutorial, checkpoint, restart, licence, tensile strength,
+interlock, Mohr-Coulomb, unbalanced force, contact detection, post-peak softening, confidence
+interval, cyclic, degradation, seismic, CNL, CNS, history variable, troubleshooting
+""".replace("\n", " ")
+    .strip()
+    .split(", ")
+)
+
+
+@pytest.mark.parametrize("term", TERMS)
+def test_pages_use_the_standard_term(term):
+    """Read by a person: in the text of a page, not in its code."""
+    words = re.escape(term).replace(r"\ ", r"\s+")
+    prose = [without_code_and_pictures(text(page)) for page in PAGES]
+    assert any(re.search(rf"\b{words}s?\b", one, re.IGNORECASE) for one in prose)
+
+
+@pytest.fixture(scope="module")
+def search_index(tmp_path_factory):
+    """Terms of the search of the site, each with the numbers of its pages.
+
+    The pages are built without the gallery and the reference of functions, which take minutes.
+    """
+    application = pytest.importorskip("sphinx.application")  # comes with the extra `docs`
+    pytest.importorskip("sphinx_gallery")
+    from sphinx.util.docutils import docutils_namespace
+
+    out = tmp_path_factory.mktemp("site")
+    quick = {"extensions": ["myst_parser", "pages"], "html_theme": "basic", "html_static_path": []}
+    with docutils_namespace():
+        site = application.Sphinx(
+            ROOT / "docs", ROOT / "docs", out, out / "doctrees", "html", quick, status=None,
+            warning=None,
+        )  # fmt: skip
+        site.build()
+        index = site.builder.indexer
+        return index.lang, index.freeze()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("term", TERMS)
+def test_search_of_the_site_finds(search_index, term):
+    """One page has all words of the term, after the stemming that the search applies to them."""
+    language, frozen = search_index
+    found = [
+        {index}
+        if isinstance(index := frozen["terms"].get(stem, frozen["titleterms"].get(stem, [])), int)
+        else set(index)
+        for stem in (language.stem(word.lower()) for word in re.findall(r"\w+", term))
+    ]
+    assert set.intersection(*found)
+
+
+def messages():
+    """Text of every string of the sources, with `...` for what is filled in."""
+    for path in [*ROOT.glob("jointlaw/**/*.py"), *ROOT.glob("dem_demo/**/*.py")]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                parts = (getattr(part, "value", "...") for part in node.values)
+                yield "".join(part if isinstance(part, str) else "..." for part in parts)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                yield node.value
+    yield from (path.read_text(encoding="utf-8") for path in ROOT.glob("jointlaw/**/*.cpp"))
+
+
+ELSEWHERE_SAID = {"No module named 'pymunk'", "jointlaw: command not found"}  # Python, the shell
+
+
+def test_troubleshooting_quotes_messages_as_the_code_has_them():
+    rows = re.findall(r"^\| (.+?) \|", text("docs/troubleshooting.md"), re.MULTILINE)
+    quoted = {quote for row in rows for quote in re.findall(r"`([^`]+)`", row)}
+    quoted = {quote for quote in quoted if " " in quote} - ELSEWHERE_SAID
+    assert len(quoted) > 20
+    sources = "\n".join(messages())
+    assert [quote for quote in sorted(quoted) if quote not in sources] == []

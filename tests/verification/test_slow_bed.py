@@ -222,7 +222,7 @@ PAGE = {  # loss at amplitudes 0.1 and 0.32, shear kept after 100 openings by 0.
 
 
 def test_small_cycles_of_named_resolutions_are_as_the_page_says():
-    """The figures of docs/limits.md, "Small cycles", against the slow bed."""
+    """The figures of docs/limits.md, "Damping in small cycles", against the slow bed."""
     one = replace(jl.presets.load("westerly-rough"), plane=0.0)
     R, exact = one.closure_range, []
     amplitudes = AMPLITUDES[[16, 20]] * R

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from jointlaw.support.progress import track
-from jointlaw.support.pyplot import style, written
+from jointlaw.support.pyplot import escape_math, style, written
 
 from ..scene import turn, usual_size
 from .monitors import shear_curve
@@ -134,7 +134,8 @@ class Pictures:
         )
         if len(blocks) <= FEW:
             for block, shape in zip(blocks, shapes, strict=True):
-                axes.text(*shape.mean(axis=0), block.name, ha="center", va="center", clip_on=True)
+                name = escape_math(block.name)
+                axes.text(*shape.mean(axis=0), name, ha="center", va="center", clip_on=True)
         if record.scene.water:
             axes.plot(*record.scene.water.line.T, color=WATER, lw=1.5, ls="-.", zorder=4)
         ends, state = record.joints[i]["ends"], self.states(i)
@@ -148,7 +149,8 @@ class Pictures:
             )
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
                  ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
-        axes.figure.suptitle(f"{self.title}\nt = {record.times[i]:.2f} s{note}")
+        title = f"{self.title}\nt = {record.times[i]:.2f} s{note}"
+        axes.figure.suptitle(escape_math(title))
 
     @style()
     def final(self, path: Path) -> None:
@@ -187,14 +189,14 @@ def curves(record: Record, path: Path) -> None:
             for key in ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
         )
         unit, told = pressure(float(stress.max()))
-        upper.plot(1e3 * slid, unit * tau, label=f"{name} (blocks)")
+        upper.plot(1e3 * slid, unit * tau, label=escape_math(f"{name} (blocks)"))
         lower.plot(1e3 * slid, 1e3 * (closure[0] - closure))
         law = record.scene.laws[record.laws[moving, base]]
         if alone := shear_curve(law, float(stress[0]), slid):
             dots, label = {"color": "k", "ls": ":"}, "law alone, at the normal stress of the start"
             upper.plot(1e3 * alone.shear_2, unit * alone.F2, label=label, **dots)
             lower.plot(1e3 * alone.shear_2, 1e3 * (alone.closure[0] - alone.closure), **dots)
-    upper.set(title=record.scene.title, ylabel=f"shear stress ({told})")
+    upper.set(title=escape_math(record.scene.title), ylabel=f"shear stress ({told})")
     lower.set(ylabel="dilation since seating (mm)", xlabel="shear displacement (mm)")
     figure.legend(loc="outside lower center", ncols=3)
     written(figure, path)

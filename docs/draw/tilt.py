@@ -3,7 +3,9 @@
     python docs/draw/tilt.py FOLDER
 
 Runs the scene `tilt`. Each pair of slab and table is drawn when the slab has slid by half a metre.
-Writes FOLDER/tilt.png.
+The friction angle is drawn where the slab slides. At 5 and 8 s the tables slow down, the slabs
+stick, and for half a second their joints carry less shear stress than their friction: such records
+are left out. Writes FOLDER/tilt.png.
 """
 
 from dataclasses import replace
@@ -18,6 +20,8 @@ from jointlaw.support.pyplot import style
 COLOURS = "#c95500", "#1f6fd0"
 WAYS = "rough direction\ndown the slope", "rough direction\nacross the slope"
 DRAWN = 0.5  # m of slip
+SLIDING = 0.5  # smallest share of the joint that slides under a sliding slab, to a slip of FAR
+FAR = 1e-3  # m of slip, past the peak: a slab does not stick again before it comes to rest
 SLOW, LEAST = 1e-4, 1e-12  # growth of slip between two records: share of the slip, m; less is rest
 
 
@@ -35,10 +39,12 @@ def main(folder):
             above.fill(*shape[base].T, color=FIXED)
             above.fill(*shape[moving].T, color="#efe9dc", ec=colour, lw=2)
             above.text(shape[base][:, 0].mean(), 3.2, way, color=colour, ha="center", va="bottom")
-            farther = np.diff(np.maximum.accumulate(slip), prepend=0.0) > SLOW * slip + LEAST
+            grows = np.diff(np.maximum.accumulate(slip), prepend=0.0) > SLOW * slip + LEAST
+            sticks = (record.column(f"{name}: sliding_share") < SLIDING) & (slip < FAR)
+            slides = grows & ~sticks
             ratio = record.column(f"{name}: shear_Pa") / record.column(f"{name}: normal_Pa")
             angle = np.degrees(np.arctan(np.abs(ratio)))
-            below.semilogx(1e3 * slip[farther], angle[farther], color=colour)
+            below.semilogx(1e3 * slip[slides], angle[slides], color=colour)
             below.text(2.2, tilt, f"slips at a tilt of {tilt:.2f}°", color=colour, weight="bold",
                        va="center")  # fmt: skip
         rest = np.degrees(np.arctan(scene.laws["along"].asperity.mu))

@@ -12,7 +12,7 @@ from ..laws.joint_law import JointLaw
 from ..support.checks import Array
 from ..support.markdown import table
 from ..support.progress import track
-from ..support.pyplot import pyplot, style, written
+from ..support.pyplot import escape_math, pyplot, style, written
 from .estimates import Estimates
 from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
@@ -144,7 +144,8 @@ class Fit(Estimates):
                 axis.plot(way, scale * law, color=f"C{k}")
                 if points is not None:
                     axis.plot(1e3 * curve.shear, scale * points, **dots)
-            axes[0, -2].plot([], [], label=curve.name + ("" if fitted else ", predicted"), **dots)
+            label = escape_math(curve.name) + ("" if fitted else ", predicted")
+            axes[0, -2].plot([], [], label=label, **dots)
         if shears:
             axes[0, -2].set(xlabel="shear displacement (mm)", ylabel="shear stress (MPa)")
             axes[0, -1].set(xlabel="shear displacement (mm)", ylabel="opening (mm)")

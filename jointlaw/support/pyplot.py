@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-#: Formats of pictures; the first one unless another is asked for
+#: Formats of pictures; the first one unless another is requested
 FORMATS = ("png", "svg", "pdf")
 
 # Settings of matplotlib for every picture of the project, 7.5 inches wide or less: letters are
@@ -23,12 +23,23 @@ STYLE: dict[str, Any] = {
     "lines.linewidth": 1.5,
     "lines.markersize": 4,
     "savefig.dpi": 150,
-    "text.parse_math": False,  # titles and names are the user's, and may hold $
 }
 
 
+def escape_math(text: str) -> str:
+    """Escape the $ of a text for matplotlib, which would read mathematics between two of them.
+
+    For titles and names that a user gives. Mathematics cannot be switched off as a whole
+    (`text.parse_math`), because matplotlib writes the powers of ten of a logarithmic axis with it.
+    """
+    return text.replace("$", r"\$")
+
+
 def pyplot() -> Any:
-    """The module matplotlib.pyplot. Raises ImportError with the remedy where it is missing."""
+    """Import and return the module matplotlib.pyplot.
+
+    Raises ImportError with the remedy where it is missing.
+    """
     try:
         from matplotlib import pyplot
     except ImportError as error:
@@ -38,9 +49,9 @@ def pyplot() -> Any:
 
 @contextmanager
 def style() -> Iterator[Any]:
-    """matplotlib.pyplot with `STYLE`, as in `with style() as plt:`; the user's own style returns.
+    """Apply `STYLE` and return matplotlib.pyplot: `with style() as plt:`.
 
-    As `@style()` it gives a function that draws this style.
+    The user's own style is restored at the end. As `@style()` it decorates a function that draws.
 
     Raises ImportError with the remedy where matplotlib is missing.
     """
@@ -50,9 +61,10 @@ def style() -> Iterator[Any]:
 
 
 def written(figure: Any, path: str | Path | None) -> Any:
-    """The figure; with `path` it is written there and closed.
+    """Save a figure to `path` and close it, or leave it open without a path; returns the figure.
 
-    In a notebook it is closed too: a cell shows what it returns, and would show it twice.
+    In a notebook it is closed too: a cell shows the figure that it returns, and would show an open
+    one a second time.
     """
     if path is not None:
         figure.savefig(path, dpi=STYLE["savefig.dpi"])

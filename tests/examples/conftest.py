@@ -1,5 +1,9 @@
-"""Examples run as a reader runs them: in an empty folder, without a display."""
+"""Examples run as a reader runs them: in an empty folder, without a display.
 
+No picture that they save, and no frame of an animation, shows TeX source.
+"""
+
+import figure_text
 import pytest
 
 
@@ -10,3 +14,18 @@ def _without_a_display(in_an_empty_folder):
     pyplot.switch_backend("Agg")
     yield
     pyplot.close("all")
+
+
+@pytest.fixture(autouse=True)
+def _no_picture_shows_tex_source(monkeypatch):
+    from matplotlib.figure import Figure
+
+    save, found = Figure.savefig, []
+
+    def save_and_check(figure, *arguments, **options):
+        found.extend(figure_text.tex_source(figure))
+        return save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", save_and_check)
+    yield
+    assert found == []

@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from figure_text import tex_source
+from matplotlib import pyplot
 
 import jointlaw as jl
 from jointlaw.support.pyplot import style
@@ -68,16 +70,15 @@ WITHOUT_UNIT = re.compile(r"iteration|branch: .*|.+ over .+")  # counts and rati
 
 
 def run(path):
-    """Each picture as it was after the cell that drew it."""
-    from matplotlib import pyplot
-
-    space, shown = {"__name__": "__main__"}, []
+    """Each picture as it was after the cell that drew it, and the TeX source that they show."""
+    space, shown, source = {"__name__": "__main__"}, [], []
     for number, cell in enumerate(re.split(r"^# %%.*$", path.read_text(), flags=re.MULTILINE)):
         exec(compile(cell, f"{path.name}, cell {number + 1}", "exec"), space)
         figures = [pyplot.figure(number) for number in pyplot.get_fignums()]
         shown += [(axes, len(axes.get_children())) for one in figures for axes in one.axes]
+        source += [text for figure in figures for text in tex_source(figure)]
         pyplot.close("all")
-    return shown
+    return shown, source
 
 
 def faults(axes, parts):
@@ -112,8 +113,9 @@ def test_example_runs(name):
     with style() as plt, warnings.catch_warnings():
         plt.switch_backend("Agg")
         warnings.filterwarnings("ignore", message=".*non-interactive.*")  # plt.show()
-        shown = run(GALLERY[name])
+        shown, source = run(GALLERY[name])
     assert shown
+    assert source == []
     assert [fault for one in shown for fault in faults(*one)] == []
 
 
@@ -143,6 +145,7 @@ KNOWN = {
 def test_figure(number, monkeypatch):
     monkeypatch.syspath_prepend(FIGURES[number].parent)
     panels = runpy.run_path(str(FIGURES[number]))["panels"]
+    assert [tex_source(pyplot.figure(drawn)) for drawn in pyplot.get_fignums()] == [[]]
     for curve in (curve for lines in panels.values() for curve in lines.values()):
         assert np.isfinite(np.array(curve, float)).all()
     if number >= 11:  # loading: both forms of the law

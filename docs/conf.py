@@ -45,7 +45,7 @@ suppress_warnings = [
 nitpicky = True  # a reference that leads nowhere is an error
 nitpick_ignore_regex = [(r"py:.*", r".*")]  # types of numpy and Python live on other sites
 
-myst_enable_extensions = ["dollarmath", "amsmath"]
+myst_enable_extensions = ["dollarmath", "amsmath", "html_image"]
 myst_heading_anchors = 3
 
 html_theme = "furo"

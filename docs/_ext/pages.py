@@ -17,7 +17,7 @@ def first_part():
     if not mark:
         raise ValueError(f"{README}: the line {SHARED} is missing; index.md includes what is above")
     inside = re.sub(r"\]\((?!docs/|\w+:|#)([^)\s]+)\)", r"](../\1)", shared)
-    return inside.replace("](docs/", "](")
+    return inside.replace("](docs/", "](").replace('src="docs/', 'src="')
 
 
 def links(text):

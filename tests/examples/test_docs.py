@@ -174,7 +174,8 @@ def test_readme_shares_its_first_part_with_the_first_page_of_the_site():
     shown = pages.links(pages.first_part())
     assert blocks("README.md", "python")[0] in shown
     assert shown.count("```bash") == 2
-    targets = re.findall(r"\]\(([^)#\s]+)", shown)
+    targets = re.findall(r"\]\(([^)#\s]+)|src=\"([^\"]+)", shown)
+    targets = [link or picture for link, picture in targets]
     inside = [target for target in targets if "://" not in target and "examples/" not in target]
     inside = [
         target for target in inside if not target.startswith("figures/")
@@ -193,7 +194,8 @@ def test_cells_of_tables_are_short(page):
 @pytest.mark.parametrize("page", PAGES)
 def test_what_a_page_names_exists(page):
     """Links as on GitHub, the site's own are checked where it is built; files, and commands."""
-    links = [link for link in re.findall(r"\]\(([^)#\s]+)", text(page)) if "://" not in link]
+    links = re.findall(r"(?:\]\(|<img src=\")([^)#\s\"]+)", text(page))
+    links = [link for link in links if "://" not in link]
     files = re.findall(r"(?:python|pytest) ((?:docs|benchmarks|tests)/?[\w/.]*)", text(page))
     named = [PAGES[page].parent / link for link in links] + [ROOT / file for file in files]
     assert [path for path in named if not path.exists()] == []

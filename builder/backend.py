@@ -29,7 +29,7 @@ build = importlib.import_module("jointlaw.native.build")
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
     """What setuptools asks for, and a compiler where there is none."""
     needed = build_meta.get_requires_for_build_wheel(config_settings)
-    own = not os.environ.get(TARGET) and any(map(build.works, build.installed()))
+    own = not os.environ.get(TARGET) and any(map(build.works, build.compilers_on_path()))
     return needed if own else [*needed, "ziglang"]
 
 

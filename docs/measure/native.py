@@ -154,7 +154,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         libs = {"C": library(folder, options.cc),
-                "bare": library(folder, options.cc, "-DJOINTLAW_NO_LEDGER"),
+                "bare": library(folder, options.cc, "-DJOINTLAW_NO_DISSIPATION"),
                 "many": library(folder, options.cc, "-DJOINTLAW_MANY")}  # fmt: skip
         for resolution in ("fast", "balanced", "fine"):
             for where, plane in PLACES.items():

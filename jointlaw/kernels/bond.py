@@ -16,12 +16,12 @@ class Bonded(Element):
     def numbers(self) -> dict[str, float]:
         begin, end = self.bond.limits
         return {
-            "bond_normal": self.bond.normal_stiffness,
-            "bond_shear": self.bond.shear_stiffness,
-            "opening_begin": float(begin[0]),
-            "slip_begin": float(begin[1]),
-            "opening_end": float(end[0]),
-            "slip_end": float(end[1]),
+            "bond_normal_stiffness": self.bond.normal_stiffness,
+            "bond_shear_stiffness": self.bond.shear_stiffness,
+            "inverse_onset_opening": float(begin[0]),
+            "inverse_onset_slip": float(begin[1]),
+            "inverse_failure_opening": float(end[0]),
+            "inverse_failure_slip": float(end[1]),
         }
 
     def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:

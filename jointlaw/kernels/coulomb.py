@@ -56,14 +56,14 @@ class Coulomb(Element):
 
     def numbers(self) -> dict[str, float]:
         return {
-            "coulomb_normal": self.normal,
-            "coulomb_shear": self.shear,
+            "coulomb_normal_stiffness": self.normal,
+            "coulomb_shear_stiffness": self.shear,
             "coulomb_friction": self.friction,
             "coulomb_cohesion": self.cohesion,
             "coulomb_tension": self.tension,
             "coulomb_residual_friction": self.residual_friction,
             "coulomb_residual_cohesion": self.residual_cohesion,
-            "coulomb_weakening": self.weakening,
+            "coulomb_weakening_length": self.weakening,
         }
 
     def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:

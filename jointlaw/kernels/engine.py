@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..native import library
-from ..native.layout import Law
+from ..native.layout import LawStruct
 from ..native.library import address
 from ..support.checks import Array, one_of
 from . import reference
@@ -25,7 +25,7 @@ from .reference import Tables
 from .threads import share_out, thread_count
 
 Index = NDArray[np.intp]
-LANES = 8  # joints of a block, which lie side by side: JLAW_BLOCK in native/batch.h
+LANES = 8  # joints of a block, which lie side by side: JLAW_JOINTS_PER_BLOCK in native/batch.h
 LINE = 64  # bytes that a processor reads at once
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
 GRAINS = 16  # of joints: a thread takes as many, one after the other, if all are equally fast
@@ -145,8 +145,8 @@ class NativeEngine:
         # kept, for the structure points to them
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
         pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
-        self._law, self._sliders = Law(**numbers, **pointers), tables.sliders
-        self._library_run, self.lanes = loaded.jlaw_run, library.lanes(loaded)
+        self._law, self._sliders = LawStruct(**numbers, **pointers), tables.sliders
+        self._library_run, self.lanes = loaded.jlaw_run, library.vector_lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
         facets = 0 if tables.asperities is None else len(tables.asperities.c1)
@@ -159,7 +159,7 @@ class NativeEngine:
             arrays = (address(array) for array in (step.d, step.F, step.C, step.shown, step.where))
             call = self._prepared(state, len(step.d), *arrays)
             step.call = state, call
-        call.ledger, call.keep = ledger, step.keep
+        call.track_dissipation, call.commit = ledger, step.keep
         self._run(library.ADVANCE, call)
 
     def refresh(self, state: Array, n: int) -> None:
@@ -189,11 +189,11 @@ class NativeEngine:
         """Call the library on one thread or several, which share the joints out."""
         where, n = ctypes.addressof(call), call.n
         threads = min(thread_count(), -(-n // LANES)) if n * self._sliders > SERIAL else 1
-        call.taken = 0
+        call.next = 0
         if threads == 1:
             self._work(where, what)
             return
-        call.grain = -(-n // (GRAINS * threads * LANES)) * LANES
+        call.chunk = -(-n // (GRAINS * threads * LANES)) * LANES
         share_out(partial(self._work, where, what), threads)
 
     def _work(self, where: int, what: int) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import FacetTables
-from ..native.layout import LANES, LARGEST, NUMBERS, TABLES, WHOLE, first_columns
+from ..native.layout import ARRAYS, FACET_LANES, INTEGERS, LARGEST_FLOAT, REALS, column_offsets
 from ..support.checks import Array
 from .asperities import Asperities, strength
 from .cells import compliance
@@ -16,13 +16,13 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
 
     Raises KeyError for an element or a number that native/layout.py does not name.
     """
-    numbers: dict[str, int | float] = dict.fromkeys(WHOLE, 0) | dict.fromkeys(NUMBERS, 0.0)
-    arrays = {name: np.zeros(0) for name in TABLES}
+    numbers: dict[str, int | float] = dict.fromkeys(INTEGERS, 0) | dict.fromkeys(REALS, 0.0)
+    arrays = {name: np.zeros(0) for name in ARRAYS}
     found = {
         "dim": k.dim,
-        "largest_reach": min(element.reach for element in k.elements),
-        "farthest": min(min(one.reach, one.farthest) for one in k.elements),
-        "stretch": k.stretch,
+        "max_effective_closure": min(element.reach for element in k.elements),
+        "max_search_closure": min(min(one.reach, one.farthest) for one in k.elements),
+        "closure_per_displacement": k.stretch,
     }
     for element in k.elements:
         found |= {type(element).__name__.lower(): 1, **element.numbers()}
@@ -30,7 +30,7 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
             arrays |= _arrays(element.k, element.first_loading.yielding)
     if missing := found.keys() - numbers.keys():
         raise KeyError(f"native/layout.py has no {', '.join(sorted(missing))}")
-    numbers |= {name: min(value, LARGEST) for name, value in found.items()}
+    numbers |= {name: min(value, LARGEST_FLOAT) for name, value in found.items()}
     return numbers, arrays
 
 
@@ -42,21 +42,21 @@ def _arrays(k: FacetTables, late: tuple[Array, Array] | None) -> dict[str, Array
         "T": k.t.T,
         "N": k.n.T,
         "E": k.azimuth.T,
-        "STEEP": k.steep,
-        "COSINE": k.c1,
+        "TAN_THETA": k.steep,
+        "COS_THETA": k.c1,
         "A": k.area,
-        "STIFF": k.area / k.c1,
-        "STRENGTH": strength(k, np.ones((1, 1))).ravel(),
-        "COMPLIANCE": compliance(k).ravel(),
-        "POTENTIAL": k.area * k.c1,
-        "SHARE": k.weight / k.weight.sum(),
+        "SHEAR_STIFFNESS": k.area / k.c1,
+        "FRICTION_LIMIT": strength(k, np.ones((1, 1))).ravel(),
+        "SLIDER_COMPLIANCE": compliance(k).ravel(),
+        "ENERGY_FACTOR": k.area * k.c1,
+        "WEIGHT": k.weight / k.weight.sum(),
         "MIRROR": _mirror(k.n),
-        "RING": rings(k.theta),
+        "RING_SIZE": rings(k.theta),
     }
     if late is not None:
-        columns["YIELD"] = k.yield_depth
-        columns["LATE"] = np.hstack(np.split(np.stack(late, axis=-1), 2))  # of (2 M, 2)
-    first, M = first_columns(), len(k.c1)
+        columns["YIELD_CLOSURE"] = k.yield_depth
+        columns["YIELD_CORRECTION"] = np.hstack(np.split(np.stack(late, axis=-1), 2))  # of (2 M, 2)
+    first, M = column_offsets(), len(k.c1)
     facet = np.zeros((M, first["COLUMNS"]))
     for name, values in columns.items():
         several = values.reshape(M, -1)
@@ -88,8 +88,8 @@ def _mirror(n: Array) -> Array:
 
 
 def _in_blocks(rows: Array) -> Array:
-    """Rows of facets (M, ...) side by side: (blocks, ..., LANES), zeros beyond the last facet."""
-    full = np.zeros((-(-len(rows) // LANES), LANES, *rows.shape[1:]))
+    """Rows of facets (M, ...) as (blocks, ..., FACET_LANES); zeros beyond the last facet."""
+    full = np.zeros((-(-len(rows) // FACET_LANES), FACET_LANES, *rows.shape[1:]))
     full.reshape(-1, *rows.shape[1:])[: len(rows)] = rows
     return np.ascontiguousarray(np.moveaxis(full, 1, -1))
 
@@ -105,5 +105,5 @@ def _depth(k: FacetTables) -> Array:
     start, force0, slope0 = np.where(begin[0] < UNUSED, begin, 0.0)
     G = np.where(ends, force - force0 - slope0 * (zeta - start), 0.0)
     kappa = np.where(ends, slope - slope0, 0.0)
-    last = np.where(ends, zeta, LARGEST)
-    return np.stack([np.minimum(begin[0], LARGEST), force0, slope0, last, G, kappa], axis=-1)
+    last = np.where(ends, zeta, LARGEST_FLOAT)
+    return np.stack([np.minimum(begin[0], LARGEST_FLOAT), force0, slope0, last, G, kappa], axis=-1)

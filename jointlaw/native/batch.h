@@ -1,4 +1,5 @@
-/* batch.h: what a batch hands to the library; library.py has the same structure */
+/* batch.h: the arguments of a call of the library for many joints; library.py declares the same
+ * structure for ctypes. */
 #ifndef JLAW_BATCH_H
 #define JLAW_BATCH_H
 #include <float.h>
@@ -7,31 +8,32 @@
 typedef struct jlaw_law jlaw_law;
 #include "layout.h"
 
-enum { JLAW_BLOCK = 8 /* joints side by side in a block of states */ };
+enum { JLAW_JOINTS_PER_BLOCK = 8 /* side by side in a block of states */ };
 
-enum { /* what a step shows of a joint: shares, J/m2, damage of its bond; then its displacement */
+enum { /* measures of a joint after a step: fractions, J/m2, damage; its displacement follows them */
        JLAW_SLIDING,
        JLAW_SLIPPING,
        JLAW_SEPARATED,
        JLAW_STORED,
-       JLAW_LOST,
+       JLAW_DISSIPATED,
        JLAW_DAMAGE,
-       JLAW_SHOWN
+       JLAW_MEASURES
 };
 
 typedef struct {
   const jlaw_law *law;
-  double *state;          /* (blocks, rows, JLAW_BLOCK), or (n, rows) */
-  const double *d;        /* (n, dim), or NULL: what the states bear, before slopes wear */
+  double *state;          /* (blocks, rows, JLAW_JOINTS_PER_BLOCK), or (n, rows) if contiguous */
+  const double *d;        /* (n, dim); NULL: a zero increment, before asperities degrade */
   double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
-  double *shown;          /* (n, JLAW_SHOWN + dim): what joints then amount to, or NULL */
-  const long long *index; /* the joints that move (n,), or NULL for all */
+  double *measures;       /* (n, JLAW_MEASURES + dim) after the step, or NULL */
+  const long long *index; /* (n,): the joints to advance; NULL: all */
   long long n;
-  long long taken, grain; /* joints that threads have taken: 0 before a run; how many at once */
+  long long next,
+      chunk; /* first joint that no thread has taken, 0 before a call; joints per grab */
   int rows;
-  int alone; /* whether the states lie (n, rows) */
-  int lanes; /* of vectors: at most jlaw_lanes(), and one of jlaw_levels() */
-  int ledger, keep;
+  int contiguous; /* whether the state of a joint is contiguous, (n, rows) */
+  int lanes;      /* of a vector: at most jlaw_lanes(), and one of jlaw_levels() */
+  int track_dissipation, commit;
 } jlaw_batch;
 
 typedef int jlaw_call(const jlaw_batch *b, long first, long last);

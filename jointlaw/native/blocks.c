@@ -318,13 +318,13 @@ OUT void jl_blocks_read(jl_world *w)
   for (long long i = 0; i < w->contacts; i++) {
     const jl_pool *pool = w->pools + w->law[i];
     const double *F = pool->F + 2 * w->place[i];
-    const double *shown = pool->shown + (JLAW_SHOWN + 2) * w->place[i];
+    const double *shown = pool->shown + (JLAW_MEASURES + 2) * w->place[i];
     w->traction[2 * i] = F[0];
     w->traction[2 * i + 1] = F[1] / w->reduction[1];
-    for (int r = 0; r < JLAW_SHOWN; r++) w->shares[r * w->contacts + i] = shown[r];
+    for (int r = 0; r < JLAW_MEASURES; r++) w->shares[r * w->contacts + i] = shown[r];
     if (!pool->holds) w->shares[JLAW_DAMAGE * w->contacts + i] = 1.0;
-    w->delta[2 * i] = shown[JLAW_SHOWN] - w->touch[2 * i];
-    w->delta[2 * i + 1] = (shown[JLAW_SHOWN + 1] - w->touch[2 * i + 1]) * w->reduction[1];
+    w->delta[2 * i] = shown[JLAW_MEASURES] - w->touch[2 * i];
+    w->delta[2 * i + 1] = (shown[JLAW_MEASURES + 1] - w->touch[2 * i + 1]) * w->reduction[1];
   }
 }
 
@@ -428,7 +428,7 @@ static void book(jl_world *w, double dt)
   for (long long i = 0; i < k; i++) {
     /* a joint loses its traction at the end of the step, which acts on the area of then */
     const double area = w->area[i] = w->length[i] * w->thickness;
-    const double lost = w->shares[JLAW_LOST * k + i];
+    const double lost = w->shares[JLAW_DISSIPATED * k + i];
     stored += area * w->shares[JLAW_STORED * k + i];
     friction += area * (lost - w->lost[i]);
     w->lost[i] = lost;

@@ -12,7 +12,7 @@ typedef struct {
 typedef struct {                    /* the joints of one law, by their places in its batch */
   double *d;                        /* (places, 2): increments that its next step takes, m */
   const double *F;                  /* (places, 2): tractions after it, Pa */
-  const double *shown;              /* (places, JLAW_SHOWN + 2): what batch.h says */
+  const double *shown;              /* (places, JLAW_MEASURES + 2): what batch.h says */
   const double *stress, *stiffness; /* (points,): its virgin curve, Pa and Pa/m */
   long long points, holds;          /* holds: whether joints hold tension until they are damaged */
 } jl_pool;
@@ -53,7 +53,7 @@ typedef struct {
   const double *touch;          /* (k, 2): where its joint first touches, m */
   const double *reduction;      /* (2,): 1 and the F of a strength reduction */
   double *traction, *delta;     /* (k, 2) */
-  double *shares;               /* (JLAW_SHOWN, k): what the law shows of each contact */
+  double *shares;               /* (JLAW_MEASURES, k): what the law shows of each contact */
   double *area, *lost;          /* (k,): of the last step: m2, J/m2 */
   double *checked;              /* (k,): N/m for which the time step is good */
 

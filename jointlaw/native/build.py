@@ -1,8 +1,9 @@
-"""Builds the library of the compiled law, with the standard library of Python alone.
+"""Build the library of the compiled law; needs only the standard library of Python.
 
-Compilers are taken in the order clang, g++, gcc, zig: as fast as they make the law. A compiler that
-is there may still be a stub, so a trial file is compiled first. On x86-64 a library is built for
-the width of vectors of this processor, or for all three with JOINTLAW_LEVELS=all.
+Compilers are tried in the order clang, g++, gcc, zig, the order of the speed of their code for this
+law. A compiler on PATH may be a stub, so a trial file is compiled, linked and loaded first. On
+x86-64 the library is built for the vector width of this processor, or, with JOINTLAW_LEVELS=all,
+for all three widths.
 """
 
 import ctypes
@@ -21,14 +22,21 @@ from typing import NamedTuple
 from . import layout
 
 HERE = Path(__file__).parent
-BUILT = HERE / "built"  # the library, and headers that are made
-# no fused operations: the same bits with every compiler; the others change no result. Without the
-# passes "gcse" gcc takes 0.6 times as long, and the law is as fast.
-FLAGS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fno-gcse",
-         "-fno-gcse-after-reload", "-w")  # fmt: skip
-LEVELS = {8: "x86-64-v4", 4: "x86-64-v3", 2: "x86-64"}  # of lanes of vectors, on x86-64
-ENDINGS = {"linux": "so", "macos": "dylib", "windows": "dll"}
-TARGETS = {  # of zig, and what wheels call them
+BUILT = HERE / "built"  # the library and the generated headers
+# -ffp-contract=off: the same bits with every compiler. The other flags change no result. Without
+# its gcse passes gcc compiles in 0.6 of the time, and the law runs as fast.
+FLAGS = (
+    "-O3",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fno-gcse",
+    "-fno-gcse-after-reload",
+    "-w",
+)
+LEVELS = {8: "x86-64-v4", 4: "x86-64-v3", 2: "x86-64"}  # doubles in a vector: instruction set
+SUFFIXES = {"linux": "so", "macos": "dylib", "windows": "dll"}
+TARGETS = {  # target of zig: platform tag of the wheel
     "x86_64-linux-gnu.2.17": "manylinux_2_17_x86_64",
     "aarch64-linux-gnu.2.17": "manylinux_2_17_aarch64",
     "x86_64-macos.11.0": "macosx_11_0_x86_64",
@@ -53,24 +61,24 @@ double trial(double x)
 
 
 class Compiler(NamedTuple):
-    """A command and what of it differs from others."""
+    """A C compiler: its command, and the target if it compiles for another machine."""
 
     command: tuple[str, ...]
-    target: str = ""  # of zig, for another machine than this
+    target: str = ""  # of zig; empty: this machine
 
     @property
     def machine(self) -> tuple[str, str]:
-        """Processor and system that it builds for."""
+        """Processor and operating system of the compiled code."""
         if self.target:
             processor, system = self.target.split("-")[:2]
             return processor, system.partition(".")[0]
+        processor = platform.machine()
+        processor = {"AMD64": "x86_64", "arm64": "aarch64"}.get(processor, processor)
         system = {"Darwin": "macos", "Windows": "windows"}.get(platform.system(), "linux")
-        return {"AMD64": "x86_64", "arm64": "aarch64"}.get(
-            platform.machine(), platform.machine()
-        ), system
+        return processor, system
 
     def flags(self, lanes: int) -> list[str]:
-        """Flags, for vectors of so many lanes; at the least those of every such processor."""
+        """Flags for vectors of `lanes` doubles; 2 is the baseline of every x86-64."""
         processor, system = self.machine
         flags = [*FLAGS, "-fvisibility=hidden", *([] if system == "windows" else ["-fPIC"])]
         if processor != "x86_64":
@@ -80,79 +88,86 @@ class Compiler(NamedTuple):
         return [*flags, f"-mcpu={'baseline' if lanes == 2 else LEVELS[lanes].replace('-', '_')}"]
 
     def run(self, *arguments: object) -> None:
-        """Compile; RuntimeError tells the compiler's words. OSError where it does not start."""
+        """Run the compiler; RuntimeError holds its messages, OSError if it cannot be started."""
         command = [*self.command, *map(str, arguments)]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode:
-            raise RuntimeError(f"{' '.join(command)}\n{done.stderr}")
+        process = subprocess.run(command, capture_output=True, text=True)
+        if process.returncode:
+            raise RuntimeError(f"{' '.join(command)}\n{process.stderr}")
 
-    def link(self, objects: Iterable[Path], out: Path) -> None:
-        """Make a library."""
+    def link(self, objects: Iterable[Path], library: Path) -> None:
+        """Link object files into a shared library."""
         system = self.machine[1]
-        words = tuple(word for word in self.command if word not in ("-x", "c++"))
-        needed = ["-Wl,--as-needed"] if system == "linux" else []
+        linker = tuple(word for word in self.command if word not in ("-x", "c++"))
+        link_flags = ["-Wl,--as-needed"] if system == "linux" else []
         math = [] if system == "windows" else ["-lm"]
-        self._replace(command=words).run("-shared", *needed, *objects, "-o", out, *math)
+        self._replace(command=linker).run("-shared", *link_flags, *objects, "-o", library, *math)
 
 
 def zig(target: str = "") -> Compiler:
-    """The compiler of the package `ziglang`, for this machine or another."""
-    known = target or f"{platform.machine()}-linux-gnu.2.17"
-    if not target and platform.system() != "Linux":
-        return Compiler((sys.executable, "-m", "ziglang", "cc"))
-    return Compiler((sys.executable, "-m", "ziglang", "cc", "-target", known), target)
+    """The compiler of the package `ziglang`, for this machine or a target of `TARGETS`."""
+    command = (sys.executable, "-m", "ziglang", "cc")
+    if target:
+        return Compiler((*command, "-target", target), target)
+    if platform.system() == "Linux":
+        return Compiler((*command, "-target", f"{platform.machine()}-linux-gnu.2.17"))
+    return Compiler(command)
 
 
-def installed() -> list[Compiler]:
-    """Compilers of this machine that may work, the one that makes the fastest library first."""
+def compilers_on_path() -> list[Compiler]:
+    """Compilers on PATH, in the order in which they are tried."""
     commands = [("clang",), ("g++", "-x", "c++", "-fno-exceptions"), ("gcc",), ("cc",)]
     return [Compiler(command) for command in commands if shutil.which(command[0])]
 
 
-def lanes_here(compiler: Compiler) -> int:
-    """Lanes of vectors that this processor has, told by a library that the compiler makes.
+def processor_lanes(compiler: Compiler) -> int:
+    """Doubles in the widest vector of this processor, as a library built by the compiler reports.
 
-    OSError or RuntimeError where it makes none.
+    Raises OSError or RuntimeError if the compiler builds no library that this Python loads.
     """
-    # Windows keeps the file of a library that is loaded
+    # Windows locks the file of a loaded library, so that its folder cannot be removed
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        source, out = folder / "trial.c", folder / "trial.out"
-        source.write_text(TRIAL)
-        parts = (source, max(LEVELS)), (HERE / "processor.c", min(LEVELS))
-        objects = [folder / f"{lanes}.o" for _, lanes in parts]
-        for (part, lanes), made in zip(parts, objects, strict=True):
-            compiler.run(*compiler.flags(lanes), "-c", part, "-o", made)
-        compiler.link(objects, out)
-        return int(ctypes.CDLL(str(out)).jlaw_lanes())
+        trial = folder / "trial.c"
+        trial.write_text(TRIAL)
+        objects = []
+        for source, lanes in ((trial, max(LEVELS)), (HERE / "processor.c", min(LEVELS))):
+            objects.append(folder / f"{source.stem}.o")
+            compiler.run(*compiler.flags(lanes), "-c", source, "-o", objects[-1])
+        library = folder / "trial.out"
+        compiler.link(objects, library)
+        return int(ctypes.CDLL(str(library)).jlaw_lanes())
 
 
 def works(compiler: Compiler) -> bool:
-    """Whether the compiler makes a library that this Python loads."""
+    """Whether the compiler builds a library that this Python loads."""
     try:
-        return lanes_here(compiler) > 0
+        return processor_lanes(compiler) > 0
     except (OSError, RuntimeError):
         return False
 
 
-def chosen_levels(compiler: Compiler) -> tuple[int, ...]:
-    """Lanes of the vectors that a library is built for: all for another machine, else those of this
-    processor, all by JOINTLAW_LEVELS=all. ValueError for another value."""
-    asked = os.environ.get("JOINTLAW_LEVELS", "")
-    if asked not in ("", "all"):
-        raise ValueError(f"JOINTLAW_LEVELS = {asked!r} is unknown; write all, or leave it out")
+def select_levels(compiler: Compiler) -> tuple[int, ...]:
+    """Vector widths to build for: this processor's; all for another machine or JOINTLAW_LEVELS=all.
+
+    Raises ValueError for another value of JOINTLAW_LEVELS.
+    """
+    setting = os.environ.get("JOINTLAW_LEVELS", "")
+    if setting not in ("", "all"):
+        raise ValueError(f"JOINTLAW_LEVELS = {setting!r} is unknown; set it to all, or unset it")
     if compiler.machine[0] != "x86_64":
         return (min(LEVELS),)
-    return tuple(LEVELS) if asked or compiler.target else (lanes_here(compiler),)
+    if setting or compiler.target:
+        return tuple(LEVELS)
+    return (processor_lanes(compiler),)
 
 
 def find_compiler() -> Compiler | None:
-    """The first compiler of this machine that works, zig included; None if none does."""
-    return next((c for c in [*installed(), zig()] if works(c)), None)
+    """The first working compiler of this machine, zig included; None if there is none."""
+    return next((c for c in [*compilers_on_path(), zig()] if works(c)), None)
 
 
-def sources() -> str:
-    """Hash of all that a library is built from."""
+def hash_sources() -> str:
+    """Hash of the sources of the library, by which a stale library is recognised."""
     digest = hashlib.sha256(layout.layout_h().encode())
     for path in sorted([*HERE.glob("*.[ch]"), HERE / "build.py"]):
         digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
@@ -160,45 +175,62 @@ def sources() -> str:
 
 
 def write_headers(folder: Path = BUILT) -> None:
-    """Write layout.h, for the library, and jointlaw.h, for hosts in C."""
+    """Write layout.h, for the library, and jointlaw.h, for host codes."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "layout.h").write_text(layout.layout_h(), encoding="utf-8")
     (folder / "jointlaw.h").write_text(layout.jointlaw_h(), encoding="utf-8")
 
 
 def library_name(system: str) -> str:
-    """Name of the library's file on this system."""
-    return f"libjointlaw.{ENDINGS[system]}"
+    """File name of the library on an operating system of `SUFFIXES`."""
+    return f"libjointlaw.{SUFFIXES[system]}"
+
+
+class Unit(NamedTuple):
+    """A translation unit of the library: source file, vector width, macros."""
+
+    source: str
+    lanes: int
+    macros: tuple[str, ...] = ()
+
+
+def translation_units(levels: Iterable[int]) -> list[Unit]:
+    """All units of a library for these vector widths; batch.c is compiled twice for each."""
+    baseline = min(LEVELS)
+    identity = (f"-DJLAW_LEVELS={sum(levels)}", f'-DJLAW_SOURCES="{hash_sources()}"')
+    units = [
+        Unit("library.c", baseline, identity),
+        Unit("processor.c", baseline),
+        Unit("blocks.c", baseline),
+    ]
+    for lanes in levels:
+        contiguous = ("-DJL_W=4", f"-DKIND=_{lanes}_contiguous", "-DJLAW_FACET_VECTORS")
+        units.append(Unit("batch.c", lanes, (f"-DJL_W={lanes}", f"-DKIND=_{lanes}")))
+        units.append(Unit("batch.c", lanes, contiguous))
+    return units
 
 
 def build(compiler: Compiler, folder: Path = BUILT) -> Path:
-    """Build the library into the folder; its path. RuntimeError tells the compiler's words."""
-    levels = chosen_levels(compiler)
-    write_headers(folder)
-    out = folder / library_name(compiler.machine[1])
-    holds = f"-DJLAW_LEVELS={sum(levels)}", f'-DJLAW_SOURCES="{sources()}"'
-    own = ("processor.c", min(LEVELS), ()), ("blocks.c", min(LEVELS), ())
-    parts = [("library.c", min(LEVELS), holds), *own]
-    for lanes in levels:
-        parts += [
-            ("batch.c", lanes, (f"-DJL_W={lanes}", f"-DKIND=_{lanes}")),
-            ("batch.c", lanes, ("-DJL_W=4", f"-DKIND=_{lanes}_alone", "-DJLAW_ABREAST")),
-        ]
-    with tempfile.TemporaryDirectory() as scratch:
-        objects = [Path(scratch) / f"{i}.o" for i in range(len(parts))]
+    """Build the library in the folder and return its path.
 
-        def compile_one(part: tuple[str, int, tuple[str, ...]], to: Path) -> None:
-            source, lanes, what = part
-            compiler.run(
-                *compiler.flags(lanes), *what, f"-I{folder}", "-c", HERE / source, "-o", to
-            )
+    Raises RuntimeError with the messages of the compiler if it fails.
+    """
+    units = translation_units(select_levels(compiler))
+    write_headers(folder)
+    library = folder / library_name(compiler.machine[1])
+    with tempfile.TemporaryDirectory() as scratch:
+        objects = [Path(scratch) / f"{i}.o" for i in range(len(units))]
+
+        def compile_unit(unit: Unit, object_file: Path) -> None:
+            flags = [*compiler.flags(unit.lanes), *unit.macros, f"-I{folder}"]
+            compiler.run(*flags, "-c", HERE / unit.source, "-o", object_file)
 
         with ThreadPoolExecutor() as pool:
-            list(pool.map(compile_one, parts, objects))
-        made = Path(scratch) / out.name
-        compiler.link(objects, made)
-        # a library that is in use must not be written over: another file takes its place
-        fresh = out.with_name(f"{out.name}.new")
-        shutil.copyfile(made, fresh)
-        fresh.replace(out)
-    return out
+            list(pool.map(compile_unit, units, objects))
+        linked = Path(scratch) / library.name
+        compiler.link(objects, linked)
+        # a process may have the library loaded: replace the file, do not write into it
+        staged = library.with_name(f"{library.name}.new")
+        shutil.copyfile(linked, staged)
+        staged.replace(library)
+    return library

@@ -4,16 +4,16 @@ typedef struct {                     /* the part of a step in which faces touch 
   double q[2], dq[2], start, end, w; /* before; growth of q; normal stress at both ends */
   double now[2], w1, lost, trial[2], size, hold; /* after; q before it is cut to the strength */
   int slides;
-} jl_slip;
+} jl_coulomb_slip;
 
-JL_IN double jl_coulomb_friction(const jlaw_law *law, double w)
+JL_INLINE double jl_coulomb_friction(const jlaw_law *law, double w)
 {
   const double slid = w < 1.0 ? w : 1.0;
   return law->coulomb_friction + (law->coulomb_residual_friction - law->coulomb_friction) * slid;
 }
 
 /* Strength in shear at this w and this normal stress */
-JL_IN double jl_coulomb_strength(const jlaw_law *law, double w, double sigma)
+JL_INLINE double jl_coulomb_strength(const jlaw_law *law, double w, double sigma)
 {
   const double c =
       law->coulomb_cohesion + (law->coulomb_residual_cohesion - law->coulomb_cohesion) * w;
@@ -22,17 +22,19 @@ JL_IN double jl_coulomb_strength(const jlaw_law *law, double w, double sigma)
 }
 
 /* |q + t dq|, squared */
-JL_IN double jl_squared(const double q[2], double t, const double dq[2])
+JL_INLINE double jl_squared_norm(const double q[2], double t, const double dq[2])
 {
   const double x = q[0] + t * dq[0], y = q[1] + t * dq[1];
   return x * x + y * y;
 }
 
 /* Whether |q + t dq| is above cap + t rise at t = 1, and since which t; 1 if it is not */
-JL_IN int jl_leaving(const double q[2], const double dq[2], double cap, double rise, double *at)
+JL_INLINE int jl_exceeds_strength(const double q[2], const double dq[2], double cap, double rise,
+                                  double *at)
 {
   *at = 1.0;
-  if (!(sqrt(jl_squared(q, 1.0, dq)) > (cap + rise) * (1.0 + JLAW_ROUNDING_TOLERANCE))) return 0;
+  if (!(sqrt(jl_squared_norm(q, 1.0, dq)) > (cap + rise) * (1.0 + JLAW_ROUNDING_TOLERANCE)))
+    return 0;
   const double A = (dq[0] * dq[0] + dq[1] * dq[1]) - rise * rise;
   const double B = (q[0] * dq[0] + q[1] * dq[1]) - cap * rise;
   const double within = cap * cap - (q[0] * q[0] + q[1] * q[1]), C = within > 0.0 ? within : 0.0;
@@ -44,40 +46,42 @@ JL_IN int jl_leaving(const double q[2], const double dq[2], double cap, double r
 }
 
 /* Shear by dq while the normal stress goes from start to end */
-JL_IN void jl_slip_on(const jlaw_law *law, jl_slip *s)
+JL_INLINE void jl_map_to_coulomb_limit(const jlaw_law *law, jl_coulomb_slip *s)
 {
   const double first = jl_coulomb_strength(law, s->w, s->start), change = s->end - s->start;
   const double cap = jl_coulomb_strength(law, s->w, s->end);
   double at, done;
-  s->slides = jl_leaving(s->q, s->dq, first, cap - first, &at);
-  s->size = sqrt(jl_squared(s->q, 1.0, s->dq));
+  s->slides = jl_exceeds_strength(s->q, s->dq, first, cap - first, &at);
+  s->size = sqrt(jl_squared_norm(s->q, 1.0, s->dq));
   for (int i = 0; i < 2; i++) s->now[i] = s->trial[i] = s->q[i] + s->dq[i];
   s->w1 = s->w, s->hold = cap, s->lost = 0.0;
   if (!s->slides) return;
 
-  const double way = law->coulomb_shear * law->coulomb_weakening; /* of |q*| - k, w from 0 to 1 */
+  const double way =
+      law->coulomb_shear_stiffness * law->coulomb_weakening_length; /* of |q*| - k, w from 0 to 1 */
   const double far = way > 0.0 ? s->w + (s->size - cap) / way : 1.0;
   s->w1 = far < 1.0 ? far : s->w > 1.0 ? s->w : 1.0;
   s->hold = jl_coulomb_strength(law, s->w1, s->end);
   const double left = s->w < 1.0 ? 1.0 - s->w : 0.0;
-  const int ends = jl_leaving(s->q, s->dq, first + way * left, cap - first, &done);
+  const int ends = jl_exceeds_strength(s->q, s->dq, first + way * left, cap - first, &done);
   if (ends && done < at) done = at;
   const double begin = jl_coulomb_strength(law, s->w, s->start + at * change);
   const double middle =
       jl_coulomb_strength(law, 0.5 * (s->w + s->w1), s->start + 0.5 * (at + done) * change);
   const double weak = jl_coulomb_strength(law, s->w1, s->start + done * change);
-  const double reached = done < 1.0 ? sqrt(jl_squared(s->q, done, s->dq)) : s->size;
+  const double reached = done < 1.0 ? sqrt(jl_squared_norm(s->q, done, s->dq)) : s->size;
   double area = (reached - begin) * (begin + 4.0 * middle + weak) / 6.0;
   area = area + (s->size - reached) * (0.5 * (weak + s->hold));
   const double lost = 0.5 * (begin * begin - s->hold * s->hold) + area;
-  s->lost = lost > 0.0 ? lost / law->coulomb_shear : 0.0;
+  s->lost = lost > 0.0 ? lost / law->coulomb_shear_stiffness : 0.0;
   for (int i = 0; i < 2; i++) s->now[i] = s->hold / s->size * s->trial[i];
 }
 
 /* Tangent of a joint that touches; w is that before the slide, ks less in the step of touch */
-JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slip *s, double ks, double C[9])
+JL_INLINE void jl_coulomb_tangent(const jlaw_law *law, const jl_coulomb_slip *s, double ks,
+                                  double C[9])
 {
-  const double kn = law->coulomb_normal, L = law->coulomb_weakening;
+  const double kn = law->coulomb_normal_stiffness, L = law->coulomb_weakening_length;
   double n[2] = {0.0, 0.0}, turn = s->hold > 0.0 ? ks : 0.0, across = turn, push = 0.0;
   if (s->size > 0.0) n[0] = s->trial[0] / s->size, n[1] = s->trial[1] / s->size;
   if (s->slides) {
@@ -87,7 +91,7 @@ JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slip *s, double ks, 
       const double slope =
           (jl_coulomb_strength(law, 0.0, s->end) - jl_coulomb_strength(law, 1.0, s->end)) / L;
       across = across - slope;
-      push = push + slope * (kn * jl_coulomb_friction(law, s->w) / law->coulomb_shear);
+      push = push + slope * (kn * jl_coulomb_friction(law, s->w) / law->coulomb_shear_stiffness);
     }
   }
   C[0] = kn;
@@ -99,13 +103,15 @@ JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slip *s, double ks, 
 }
 
 /* One step of Coulomb's joint; returns the stored energy after it */
-JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
+JL_INLINE double jl_coulomb_step(const jlaw_law *law, jl_element_step *p, int tangent)
 {
-  const double kn = law->coulomb_normal, ks = law->coulomb_shear, T = law->coulomb_tension;
+  const double kn = law->coulomb_normal_stiffness, ks = law->coulomb_shear_stiffness,
+               T = law->coulomb_tension;
   const int last = law->dim - 1, intact = p->row[last] == 0.0;
   const double u = p->from[0] + p->d[0], before = kn * p->from[0], after = kn * u;
   const double change = after - before, moved = change == 0.0 ? 1.0 : fabs(change);
-  jl_slip s = {{0.0}, {0.0}, before, after, p->row[last], {0.0}, 0.0, 0.0, {0.0}, 0.0, 0.0, 0};
+  jl_coulomb_slip s = {{0.0}, {0.0}, before, after, p->row[last], {0.0},
+                       0.0,   0.0,   {0.0},  0.0,   0.0,          0};
   for (int i = 0; i < 3; i++) p->F[i] = 0.0;
   for (int i = 0; i < 9; i++) p->C[i] = 0.0;
   for (int i = 0; i < last; i++) s.q[i] = p->row[i];
@@ -121,10 +127,10 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
     }
     for (int i = 0; i < last; i++) s.dq[i] = ks * p->d[i + 1] * until;
     const double cap = jl_coulomb_strength(law, 0.0, before);
-    leaves = jl_leaving(s.q, s.dq, cap, jl_coulomb_strength(law, 0.0, to) - cap, &at);
+    leaves = jl_exceeds_strength(s.q, s.dq, cap, jl_coulomb_strength(law, 0.0, to) - cap, &at);
     const double sigma = before + at * (to - before);
     tears = leaves ? sigma < 0.0 : pulled;
-    if (tears) torn = 0.5 * sigma * sigma / kn + 0.5 * jl_squared(s.q, at, s.dq) / ks;
+    if (tears) torn = 0.5 * sigma * sigma / kn + 0.5 * jl_squared_norm(s.q, at, s.dq) / ks;
   }
 
   /* the part of the step in which faces touch */
@@ -137,7 +143,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   }
   s.end = touches ? after : 0.0;
   for (int i = 0; i < last; i++) s.dq[i] = ks * p->d[i + 1] * share;
-  jl_slip_on(law, &s);
+  jl_map_to_coulomb_limit(law, &s);
   const double shear = 0.5 * (s.now[0] * s.now[0] + s.now[1] * s.now[1]) / ks;
   p->lost = torn + s.lost + (parts ? shear : 0.0);
   for (int i = 0; i < last; i++) p->F[i + 1] = p->row[i] = touches ? s.now[i] : 0.0;
@@ -147,26 +153,28 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   return touches ? 0.5 * kn * u * u + shear : 0.0;
 }
 
-JL_IN int jl_coulomb_rows(const jlaw_law *law) { return law->dim; }
+JL_INLINE int jl_coulomb_rows(const jlaw_law *law) { return law->dim; }
 
-JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage, double closure)
+JL_INLINE double jl_coulomb_stiffness(const jlaw_law *law, double damage, double closure)
 {
   if (damage > 0.0 && closure < 0.0) return 0.0; /* apart */
-  const double mu = jl_coulomb_friction(law, law->coulomb_weakening > 0.0 ? damage : 1.0);
-  const double slides
-      = law->coulomb_normal * (mu < JLAW_INFINITE_FRICTION ? sqrt(1.0 + mu * mu) : 1.0);
-  return slides > law->coulomb_shear ? slides : law->coulomb_shear;
+  const double mu = jl_coulomb_friction(law, law->coulomb_weakening_length > 0.0 ? damage : 1.0);
+  const double slides =
+      law->coulomb_normal_stiffness * (mu < JLAW_INFINITE_FRICTION ? sqrt(1.0 + mu * mu) : 1.0);
+  return slides > law->coulomb_shear_stiffness ? slides : law->coulomb_shear_stiffness;
 }
 
 /* Shares of element.Measures in a state of these numbers: slides, of the strength too; is apart */
-JL_IN void jl_coulomb_shares(const jlaw_law *law, const double *s, size_t stride, double shares[3])
+JL_INLINE void jl_coulomb_fractions(const jlaw_law *law, const double *s, size_t stride,
+                                    double shares[3])
 {
   const int dim = law->dim;
   const double u = s[0], *row = s + (size_t) (dim + 1) * stride;
   const double w = row[(size_t) (dim - 1) * stride], q[2] = {row[0], dim > 2 ? row[stride] : 0.0};
-  const double none[2] = {0.0, 0.0}, cap = jl_coulomb_strength(law, w, law->coulomb_normal * u);
+  const double none[2] = {0.0, 0.0},
+               cap = jl_coulomb_strength(law, w, law->coulomb_normal_stiffness * u);
   const int apart = w > 0.0 && u < 0.0;
-  shares[0] = shares[1]
-      = !apart && sqrt(jl_squared(q, 0.0, none)) >= cap * (1.0 - JLAW_FRICTION_TOLERANCE);
+  shares[0] = shares[1] =
+      !apart && sqrt(jl_squared_norm(q, 0.0, none)) >= cap * (1.0 - JLAW_FRICTION_TOLERANCE);
   shares[2] = apart;
 }

@@ -1,4 +1,4 @@
-/* export.h: what the library shows to Python stands behind OUT */
+/* export.h: marks (OUT) the functions of the library that Python calls */
 #ifdef __cplusplus
 #define IN_C extern "C"
 #else

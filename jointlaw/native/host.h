@@ -69,7 +69,7 @@ JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_
  * position: s[0] is then negative, and a host closes the joint from there on. Returns 0; or -1 for a
  * law with an infinite mating length, always mated: the state is then the virgin one. A bond of the
  * law is broken in either. */
-JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s);
+JLAW_FUNCTION int jlaw_init_unmated(const jlaw_law *law, double *s);
 
 /* The step of jlaw_update without a check, for hosts that know their steps and for devices: row i of
  * the state is s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
@@ -77,11 +77,11 @@ JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, cons
                              double *F, double *C);
 
 /* Elastic energy, and energy lost since the virgin state, in J/m2 */
-JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s);
-JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s);
+JLAW_FUNCTION double jlaw_stored_energy(const jlaw_law *law, const double *s);
+JLAW_FUNCTION double jlaw_dissipated_energy(const jlaw_law *law, const double *s);
 /* Shares from 0 to 1. sliding: of all facets, those at their friction limit; slipping: of the
  * friction capacity, what is at its limit; separated: of all facets, those out of touch. */
-JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3]);
+JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s, double shares[3]);
 
 /* Unsheared joint: normal stress (Pa) at a closure (m), and the inverse. NaN where there is none. */
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure);
@@ -145,45 +145,46 @@ extern "C" {
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
-/* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers, CUDA) one after the
+/* Four facets side by side in one vector, or (JOINTLAW_SCALAR, other compilers, CUDA) one after the
  * other with the same bits. AVX2 where the machine has it, found out at run time unless the compiler
- * may use it or JOINTLAW_ONE_PROCESSOR tells that there is one machine. */
-#if defined(__GNUC__) && !defined(JOINTLAW_PLAIN) && !defined(__CUDACC__) \
+ * may use it or JOINTLAW_NO_DISPATCH tells that there is one machine. */
+#if defined(__GNUC__) && !defined(JOINTLAW_SCALAR) && !defined(__CUDACC__) \
     && !defined(__CUDACC_RTC__)
 #define JL_W 4
-#define JLAW_ABREAST
+#define JLAW_FACET_VECTORS
 #endif
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
-    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST)  \
-    && !defined(JOINTLAW_ONE_PROCESSOR)
-#define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
+    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)                           \
+    && defined(JLAW_FACET_VECTORS) && !defined(JOINTLAW_NO_DISPATCH)
+#define JLAW_MULTIVERSIONED __attribute__((target_clones("avx2", "default")))
 #else
-#define JLAW_CLONES
+#define JLAW_MULTIVERSIONED
 #endif
-#ifdef JOINTLAW_NO_LEDGER
-enum { JLAW_LEDGER = 0 };
+#ifdef JOINTLAW_NO_DISSIPATION
+enum { JLAW_TRACKS_DISSIPATION = 0 };
 #else
-enum { JLAW_LEDGER = 1 };
+enum { JLAW_TRACKS_DISSIPATION = 1 };
 #endif
 
 /* The law once more, for joints side by side: of as many as a vector of this machine has numbers */
-#if defined(JOINTLAW_MANY) && defined(__AVX2__) && defined(__OPTIMIZE__) && defined(JLAW_ABREAST)
+#if defined(JOINTLAW_MANY) && defined(__AVX2__) && defined(__OPTIMIZE__) \
+    && defined(JLAW_FACET_VECTORS)
 #ifdef __AVX512DQ__
 #define JM_W 8
 #else
 #define JM_W 4
 #endif
-#define JM_APART
+#define JM_STATES_CONTIGUOUS
 #include "many.h"
-static void jlaw_step_many_(const jlaw_law *law, double *s, size_t apart, const double *d,
-                            double *F, double *C)
+static void jlaw_step_vector_(const jlaw_law *law, double *s, size_t apart, const double *d,
+                              double *F, double *C)
 {
-  const jm_numbers n = {s, 1, apart};
+  const jm_states n = {s, 1, apart};
   const int dim = law->dim;
   jm_real p[3], f[3], c[9];
   for (int l = 0; l < JM_W; l++)
     for (int i = 0; i < dim; i++) p[i][l] = d[l * dim + i];
-  jm_step_of_kind(law, n, p, f, c, JLAW_LEDGER, C != NULL, 0, NULL);
+  jm_step_of_kind(law, n, p, f, c, JLAW_TRACKS_DISSIPATION, C != NULL, 0, NULL);
   for (int l = 0; l < JM_W; l++) {
     for (int i = 0; i < dim; i++) F[l * dim + i] = f[i][l];
     for (int i = 0; C && i < dim * dim; i++) C[l * dim * dim + i] = c[i][l];
@@ -203,23 +204,23 @@ static void jlaw_step_many_(const jlaw_law *law, double *s, size_t apart, const 
 typedef struct {
   char *to;
   size_t size, at;
-} jlaw_text_;
+} jlaw_message_;
 
-static JLAW_FUNCTION void jlaw_say_(jlaw_text_ *text, const char *words)
+static JLAW_FUNCTION void jlaw_append_(jlaw_message_ *text, const char *words)
 {
   for (; *words && text->at + 1 < text->size; words++) text->to[text->at++] = *words;
   if (text->size) text->to[text->at] = 0;
 }
 
 /* A number to five digits, without stdio and its locale */
-static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
+static JLAW_FUNCTION void jlaw_append_number_(jlaw_message_ *text, double x)
 {
   char digits[24];
   int exponent = 0, n = 0;
-  if (x < 0.0) jlaw_say_(text, "-");
+  if (x < 0.0) jlaw_append_(text, "-");
   x = fabs(x);
   if (!(x <= DBL_MAX)) {
-    jlaw_say_(text, x > DBL_MAX ? "inf" : "nan");
+    jlaw_append_(text, x > DBL_MAX ? "inf" : "nan");
     return;
   }
   for (; x >= 10.0; exponent++) x /= 10.0;
@@ -236,34 +237,34 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
   for (int unit = exponent >= 100 ? 100 : 10; unit; unit /= 10)
     digits[n++] = (char) ('0' + exponent / unit % 10);
   digits[n] = 0;
-  jlaw_say_(text, digits);
+  jlaw_append_(text, digits);
 }
 
 /* ------------------------------------------------------------------------ the step */
 
 /* Phi and Phi' at one y */
-static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
+static JLAW_FUNCTION double jlaw_first_loading_at_(const jlaw_law *law, double y, double *slope)
 {
   jl_real forces, slopes;
-  jl_virgin_curve(law, jl_resolved(jl_each(y)), &forces, &slopes, (jl_real *) 0);
+  jl_first_loading_curve(law, jl_flush_underflow(jl_broadcast(y)), &forces, &slopes, (jl_real *) 0);
   *slope = JL_LANE(slopes, 0);
   return JL_LANE(forces, 0);
 }
 
-static JLAW_FUNCTION double jlaw_of_facet_(const jlaw_law *law, int facet, int at)
+static JLAW_FUNCTION double jlaw_facet_value_(const jlaw_law *law, int facet, int at)
 {
-  return jl_facet_of(law, facet)[at * JLAW_LANES];
+  return jl_facet_table(law, facet)[at * JLAW_FACET_LANES];
 }
 
-JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
-                                         const double *d, double *F, double *C)
+JLAW_MULTIVERSIONED JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
+                                                 const double *d, double *F, double *C)
 {
-  const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, NULL);
+  const jl_states n = {s, stride, 0};
+  jl_step_of_kind(law, n, d, F, C, JLAW_TRACKS_DISSIPATION, C != NULL, 0, NULL);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */
-static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
+static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
 {
   double sum[4] = {0.0, 0.0, 0.0, 0.0};
   int i = 0;
@@ -274,76 +275,81 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 }
 
 #define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
-#define JLAW_ROWS_OF(law) {JLAW_ELEMENTS(JL_ROWS) - 1} /* each element's rows, 0 without it; -1 */
+#define JLAW_ELEMENT_ROWS(law) \
+  {JLAW_ELEMENTS(JL_ROWS) - 1} /* each element's rows, 0 without it; -1 */
 
 /* Damage of joints whose faces meet anew, which have neither bond nor cohesion */
-static JLAW_FUNCTION double jlaw_parted_(const jlaw_law *law)
+static JLAW_FUNCTION double jlaw_separated_damage_(const jlaw_law *law)
 {
   return law->coulomb ? JLAW_SEPARATED_STATE : 1.0;
 }
 
 /* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
-static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
+static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double *s)
 {
-  const double *rest = s + jl_rest_row(law), *worn = s + jl_worn_row(law);
+  const double *rest = s + jl_plastic_row(law), *worn = s + jl_degradation_row(law);
   int good = fabs(s[law->dim]) <= DBL_MAX;
   for (int f = 0; law->yields && f < law->facets; f++)
-    good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
+    good = good && rest[f] >= 0.0 && rest[f] <= law->max_effective_closure;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
-  if (law->wears)
+  if (law->degrades)
     good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
   const double *row = s + jl_element_row(law);
-  const int rows[] = JLAW_ROWS_OF(law);
+  const int rows[] = JLAW_ELEMENT_ROWS(law);
   for (int i = 0; rows[i] >= 0; i++)
     for (int left = rows[i]; left > 0; left--, row++)
       good = good
              && (left > 1 ? fabs(*row) < JLAW_MAX_STRENGTH
-                          : *row >= 0.0 && *row <= jlaw_parted_(law));
-  return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
+                          : *row >= 0.0 && *row <= jlaw_separated_damage_(law));
+  return good
+         && jlaw_sliders_are_valid_(s + jl_slider_row(law),
+                                    jl_plastic_row(law) - jl_slider_row(law));
 }
 
-static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
-                                      int damaged, char *message, size_t size)
+static JLAW_FUNCTION int jlaw_report_invalid_(const jlaw_law *law, const double *s, const double *d,
+                                              int damaged, char *message, size_t size)
 {
-  jlaw_text_ text = {message, size, 0};
+  jlaw_message_ text = {message, size, 0};
   int finite = 1;
   if (damaged) {
-    jlaw_say_(&text,
-              "the state holds numbers that are not finite or no forces of this law; nothing "
-              "was moved. Start from zeros or from a state that this law wrote");
+    jlaw_append_(&text,
+                 "the state holds numbers that are not finite or no forces of this law; nothing "
+                 "was moved. Start from zeros or from a state that this law wrote");
     return -1;
   }
   for (int i = 0; i < law->dim; i++) {
-    jlaw_say_(&text, i ? ", " : "the step d = (");
-    jlaw_say_number_(&text, d[i]);
+    jlaw_append_(&text, i ? ", " : "the step d = (");
+    jlaw_append_number_(&text, d[i]);
     finite = finite && fabs(d[i]) <= DBL_MAX;
   }
-  jlaw_say_(&text, finite ? ") m leads from closure "
-                          : ") m is not finite; nothing was moved. Look for the fault in the "
-                            "host's motion");
+  jlaw_append_(&text, finite ? ") m leads from closure "
+                             : ") m is not finite; nothing was moved. Look for the fault in the "
+                               "host's motion");
   if (!finite) return -1;
-  jlaw_say_number_(&text, s[0]);
-  jlaw_say_(&text, " m beyond the reach of ");
-  jlaw_say_number_(&text, law->largest_reach);
-  jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
+  jlaw_append_number_(&text, s[0]);
+  jlaw_append_(&text, " m beyond the reach of ");
+  jlaw_append_number_(&text, law->max_effective_closure);
+  jlaw_append_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
   return -1;
 }
 
 /* Whether a state and a step are such as jlaw_update takes; else 0, and whether the state is not */
-static JLAW_FUNCTION int jlaw_allowed_(const jlaw_law *law, const double *s, const double *d,
-                                       int *damaged)
+static JLAW_FUNCTION int jlaw_step_is_valid_(const jlaw_law *law, const double *s, const double *d,
+                                             int *damaged)
 {
   double far = 0.0, step_size = 0.0; /* NaN stays in sums */
   for (int i = 0; i < law->dim; i++) far += fabs(s[i]), step_size += fabs(d[i]);
-  *damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s);
-  return !*damaged && law->stretch * (far + step_size) <= law->largest_reach;
+  *damaged = !(far <= DBL_MAX) || !jlaw_state_is_valid_(law, s);
+  return !*damaged
+         && law->closure_per_displacement * (far + step_size) <= law->max_effective_closure;
 }
 
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size)
 {
   int damaged;
-  if (!jlaw_allowed_(law, s0, d, &damaged)) return jlaw_refuse_(law, s0, d, damaged, message, size);
+  if (!jlaw_step_is_valid_(law, s0, d, &damaged))
+    return jlaw_report_invalid_(law, s0, d, damaged, message, size);
   if (s1 != s0)
     for (int i = 0; i < jl_state_rows(law); i++) s1[i] = s0[i];
   jlaw_step(law, s1, 1, d, F, C);
@@ -356,11 +362,11 @@ JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_
   const size_t dim = (size_t) law->dim;
   size_t good = 0, at = 0;
   for (int damaged; good < n; good++)
-    if (!jlaw_allowed_(law, states + good * stride, d + good * dim, &damaged)) break;
+    if (!jlaw_step_is_valid_(law, states + good * stride, d + good * dim, &damaged)) break;
 #ifdef JM_W
   for (; at + JM_W <= good; at += JM_W)
-    jlaw_step_many_(law, states + at * stride, stride, d + at * dim, F + at * dim,
-                    C ? C + at * dim * dim : NULL);
+    jlaw_step_vector_(law, states + at * stride, stride, d + at * dim, F + at * dim,
+                      C ? C + at * dim * dim : NULL);
 #endif
   for (; at < good; at++)
     jlaw_step(law, states + at * stride, 1, d + at * dim, F + at * dim,
@@ -373,33 +379,37 @@ JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
 JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return jl_state_rows(law); }
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
-JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
+JLAW_FUNCTION int jlaw_init_unmated(const jlaw_law *law, double *s)
 {
-  const int far = law->fades && law->dim > 1;
+  const int far = law->interlock_decays && law->dim > 1;
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
-  if (far) s[0] = law->first_touch, s[1] = JLAW_UNMATED_DISTANCE * law->mating_length;
+  if (far) s[0] = law->first_touch_closure, s[1] = JLAW_UNMATED_DISTANCE * law->mating_length;
   double *row = s + jl_element_row(law);
-  const int rows[] = JLAW_ROWS_OF(law);
+  const int rows[] = JLAW_ELEMENT_ROWS(law);
   for (int i = 0; rows[i] >= 0; row += rows[i++])
-    if (rows[i]) row[rows[i] - 1] = jlaw_parted_(law);
+    if (rows[i]) row[rows[i] - 1] = jlaw_separated_damage_(law);
   return far ? 0 : -1;
 }
-JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
-
-JLAW_CLONES static JLAW_FUNCTION jl_amounts jlaw_measure_(const jlaw_law *law, const double *s)
+JLAW_FUNCTION double jlaw_dissipated_energy(const jlaw_law *law, const double *s)
 {
-  const jl_numbers n = {(double *) s, 1, 0}; /* only read */
+  return s[law->dim];
+}
+
+JLAW_MULTIVERSIONED static JLAW_FUNCTION jl_measures jlaw_measure_(const jlaw_law *law,
+                                                                   const double *s)
+{
+  const jl_states n = {(double *) s, 1, 0}; /* only read */
   return jl_measure(law, n);
 }
 
-JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
+JLAW_FUNCTION double jlaw_stored_energy(const jlaw_law *law, const double *s)
 {
   return jlaw_measure_(law, s).stored;
 }
 
-JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
+JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s, double shares[3])
 {
-  const jl_amounts all = jlaw_measure_(law, s);
+  const jl_measures all = jlaw_measure_(law, s);
   shares[0] = all.sliding;
   shares[1] = all.slipping;
   shares[2] = all.separated;
@@ -410,19 +420,21 @@ JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shar
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
   double slope, late = 0.0;
-  if (!(closure <= law->largest_reach)) return NAN;
+  if (!(closure <= law->max_effective_closure)) return NAN;
   for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
-    for (int i = JLAW_LATE; i < JLAW_LATE + 4; i += 2) {
-      const double depth = jlaw_of_facet_(law, f, i + 1);
-      late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
+    for (int i = JLAW_YIELD_CORRECTION; i < JLAW_YIELD_CORRECTION + 4; i += 2) {
+      const double depth = jlaw_facet_value_(law, f, i + 1);
+      late += jlaw_facet_value_(law, f, i) * jlaw_first_loading_at_(law, closure - depth, &slope);
     }
   double stress =
-      law->asperities ? law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late : 0.0;
-#define JL_FIRST(name)                                                  \
-  if (law->name) {                                                      \
-    jl_part p = {{0.0}, {closure, 0.0, 0.0}, {0.0}, {0.0}, {0.0}, 0.0}; \
-    jl_##name##_step(law, &p, 0);                                       \
-    stress += p.F[0];                                                   \
+      law->asperities
+          ? law->normal_stress_factor * jlaw_first_loading_at_(law, closure, &slope) - late
+          : 0.0;
+#define JL_FIRST(name)                                                          \
+  if (law->name) {                                                              \
+    jl_element_step p = {{0.0}, {closure, 0.0, 0.0}, {0.0}, {0.0}, {0.0}, 0.0}; \
+    jl_##name##_step(law, &p, 0);                                               \
+    stress += p.F[0];                                                           \
   }
   JLAW_ELEMENTS(JL_FIRST)
 #undef JL_FIRST
@@ -432,15 +444,15 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
   double slope = 0.0;
-  if (!(closure <= law->largest_reach)) return NAN;
-  const double force = law->asperities ? jlaw_virgin_one_(law, closure, &slope) : 0.0;
-  return law->stiffness_factor * JL_LANE(jl_stiffness_over(law, jl_each(slope)), 0)
-         + law->bending_factor * force + jl_stiffness_of_elements(law, NULL, 0, 1);
+  if (!(closure <= law->max_effective_closure)) return NAN;
+  const double force = law->asperities ? jlaw_first_loading_at_(law, closure, &slope) : 0.0;
+  return law->stiffness_factor * JL_LANE(jl_facet_stiffness_bound(law, jl_broadcast(slope)), 0)
+         + law->curvature_stiffness_factor * force + jl_elements_stiffness_bound(law, NULL, 0, 1);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
-  double low = 0.0, high = law->farthest;
+  double low = 0.0, high = law->max_search_closure;
   if (!(normal_stress >= 0.0 && jlaw_normal_stress(law, high) >= normal_stress)) return NAN;
   while (1) { /* the stress rises: halve the exponent first, then the number */
     const double middle =
@@ -454,11 +466,11 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 /* --------------------------------------------------------------- turned axes */
 
 /* The vectors of elements in axes 2 and 3 that are turned, or turned round */
-static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
-                                              const double turn[2][2])
+static JLAW_FUNCTION void jlaw_rotate_elements_(const jlaw_law *law, double *s,
+                                                const double turn[2][2])
 {
   double *row = s + jl_element_row(law);
-  const int rows[] = JLAW_ROWS_OF(law);
+  const int rows[] = JLAW_ELEMENT_ROWS(law);
   for (int i = 0; rows[i] >= 0; row += rows[i++]) {
     const double q[2] = {rows[i] > 1 ? row[0] : 0.0, rows[i] > 2 ? row[1] : 0.0};
     for (int j = 0; j < rows[i] - 1; j++) row[j] = turn[j][0] * q[0] + turn[j][1] * q[1];
@@ -471,8 +483,8 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
   if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
   double *qs = s + jl_slider_row(law), *qt = qs + M * D, *depth = qt + M * D;
   for (int f = 0; f < M; f++) {
-    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR); /* f itself across the plane */
-    if (other < f) continue;                                     /* both have changed */
+    const int other = (int) jlaw_facet_value_(law, f, JLAW_MIRROR); /* f itself across the plane */
+    if (other < f) continue;                                        /* both have changed */
     for (int i = 0; i < D; i++) {
       const double here = qs[f * D + i], turned = -qt[f * D + i]; /* t changes its sense */
       qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
@@ -483,14 +495,14 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
     depth[f] = depth[other], depth[other] = here;
   }
   const double swap[2][2] = {{-1.0, 0.0}, {0.0, 1.0}};
-  jlaw_turn_elements_(law, s, swap);
+  jlaw_rotate_elements_(law, s, swap);
 }
 
 /* Numbers of a ring of n facets, `apart` from one another, read at azimuths turned by the angle: the
  * trigonometric interpolation of n (even) places, or the straight one, which makes no new extremes */
-static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int apart, double angle, int straight)
+static JLAW_FUNCTION void jlaw_rotate_ring_(double *x, int n, int apart, double angle, int straight)
 {
-  double old[JLAW_AZIMUTHS];
+  double old[JLAW_MAX_AZIMUTHS];
   const double pi = 3.14159265358979323846;
   for (int j = 0; j < n; j++) old[j] = x[j * apart], x[j * apart] = 0.0;
   for (int j = 0; j < n; j++)
@@ -504,25 +516,25 @@ static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int apart, double angle, 
 }
 
 /* Brings sliders beyond their friction limit back to it */
-static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
+static JLAW_FUNCTION void jlaw_limit_sliders_(const jlaw_law *law, double *s)
 {
-  const jl_numbers n = {s, 1, 0};
+  const jl_states n = {s, 1, 0};
   const int M = law->facets, D = law->cells;
-  for (int at = 0; at < M; at += JL_TOGETHER) {
-    const int some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
-    const double *cell = jl_cell_of(law, at);
-    jl_facets o;
-    jl_facets_now(law, n, at, &o);
-    for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
+  for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
+    const int some = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
+    const double *cell = jl_cell_table(law, at);
+    jl_facet_step o;
+    jl_evaluate_facets(law, n, at, &o);
+    for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_FACET_LANES) {
       const int row = jl_slider_row(law) + at * D + i;
-      jl_real G, kappa, qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
-      jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
+      jl_real G, kappa, qs = jl_load(n, row, D, some), qt = jl_load(n, row + M * D, D, some);
+      jl_evaluate_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
       const jl_real cap = o.strength * G;
-      const jl_real size = jl_root(qs * qs + qt * qt);
-      const jl_yes beyond = size > cap;
-      const jl_real share = jl_pick(beyond, cap / jl_pick(beyond, size, 1.0), 1.0);
-      jl_put(n, row, D, some, qs * share);
-      jl_put(n, row + M * D, D, some, qt * share);
+      const jl_real size = jl_sqrt(qs * qs + qt * qt);
+      const jl_mask beyond = size > cap;
+      const jl_real share = jl_select(beyond, cap / jl_select(beyond, size, 1.0), 1.0);
+      jl_store(n, row, D, some, qs * share);
+      jl_store(n, row + M * D, D, some, qt * share);
     }
   }
 }
@@ -531,22 +543,22 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
-  double *q = s + jl_slider_row(law), *depth = s + jl_rest_row(law);
+  double *q = s + jl_slider_row(law), *depth = s + jl_plastic_row(law);
   if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
   if (dim != 3) return;
   const double along = s[1], across = s[2];
   s[1] = c * along + d * across, s[2] = c * across - d * along;
   const double turn[2][2] = {{c, d}, {-d, c}};
-  jlaw_turn_elements_(law, s, turn);
+  jlaw_rotate_elements_(law, s, turn);
   for (int f = 0, n; f < M; f += n) { /* rings */
-    n = (int) jlaw_of_facet_(law, f, JLAW_RING);
+    n = (int) jlaw_facet_value_(law, f, JLAW_RING_SIZE);
     for (int i = 0; i < D; i++) {
-      jlaw_turn_(q + f * D + i, n, D, angle, 0);
-      jlaw_turn_(q + (M + f) * D + i, n, D, angle, 0);
+      jlaw_rotate_ring_(q + f * D + i, n, D, angle, 0);
+      jlaw_rotate_ring_(q + (M + f) * D + i, n, D, angle, 0);
     }
-    if (law->yields) jlaw_turn_(depth + f, n, 1, angle, 1);
+    if (law->yields) jlaw_rotate_ring_(depth + f, n, 1, angle, 1);
   }
-  jlaw_hold_(law, s);
+  jlaw_limit_sliders_(law, s);
   const double after = jlaw_measure_(law, s).sheared;
   if (after > before) /* sliders gain nothing */
     for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
@@ -556,14 +568,14 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 /* ------------------------------------------------------------- table files */
 #ifndef JOINTLAW_NO_FILES
 
-#define JLAW_LONGEST (1L << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
+#define JLAW_MAX_FILE_BYTES (1L << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
 
 /* The bytes of a file and a zero; NULL if it cannot be read */
-static char *jlaw_load_(const char *file, size_t *length)
+static char *jlaw_read_bytes_(const char *file, size_t *length)
 {
   FILE *stream = fopen(file, "rb");
   const long size = stream && !fseek(stream, 0, SEEK_END) ? ftell(stream) : -1;
-  char *bytes = size >= 0 && size < JLAW_LONGEST ? (char *) malloc((size_t) size + 1) : NULL;
+  char *bytes = size >= 0 && size < JLAW_MAX_FILE_BYTES ? (char *) malloc((size_t) size + 1) : NULL;
   if (bytes) {
     rewind(stream);
     *length = fread(bytes, 1, (size_t) size, stream);
@@ -574,7 +586,7 @@ static char *jlaw_load_(const char *file, size_t *length)
 }
 
 /* FNV-1a of 64 bits, without carriage returns: any other change of one byte changes it */
-static unsigned long long jlaw_sum_of_(const char *bytes, const char *end)
+static unsigned long long jlaw_checksum_(const char *bytes, const char *end)
 {
   unsigned long long sum = 0xCBF29CE484222325ULL;
   for (; bytes < end; bytes++)
@@ -583,7 +595,7 @@ static unsigned long long jlaw_sum_of_(const char *bytes, const char *end)
 }
 
 /* Past blanks and lines that begin with # */
-static const char *jlaw_skip_(const char *at)
+static const char *jlaw_skip_blanks_(const char *at)
 {
   while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '#')
     if (*at++ == '#')
@@ -592,26 +604,26 @@ static const char *jlaw_skip_(const char *at)
 }
 
 /* Reads a word into `word`; empty if there is none or it is too long */
-static const char *jlaw_word_(const char *at, char *word, size_t room)
+static const char *jlaw_read_word_(const char *at, char *word, size_t room)
 {
   size_t n = 0;
-  for (at = jlaw_skip_(at); *at > ' ' && n + 1 < room; at++) word[n++] = *at;
+  for (at = jlaw_skip_blanks_(at); *at > ' ' && n + 1 < room; at++) word[n++] = *at;
   word[*at > ' ' ? 0 : n] = 0;
   return at;
 }
 
 /* Reads a number; NULL if it is none or not finite. Floats are hexadecimal and have no point: neither
  * locale nor rounding matters. */
-static const char *jlaw_number_(const char *at, double *number)
+static const char *jlaw_read_number_(const char *at, double *number)
 {
-  const char *begin = jlaw_skip_(at);
+  const char *begin = jlaw_skip_blanks_(at);
   char *end;
   *number = strtod(begin, &end);
   return end > begin && *end <= ' ' && fabs(*number) <= DBL_MAX ? end : NULL;
 }
 
 /* Reads all numbers into law; NULL or what is wrong */
-static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
+static const char *jlaw_parse_scalars_(const char **at, jlaw_law *law)
 {
 #define X(name, whole, least, most) {#name, offsetof(jlaw_law, name), whole, least, most},
   static const struct {
@@ -619,15 +631,15 @@ static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
     size_t place;
     int is_whole;
     double least, most;
-  } keys[] = {JLAW_NUMBERS(X)};
+  } keys[] = {JLAW_KEYWORDS(X)};
 #undef X
   char word[sizeof law->fingerprint];
   for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
     double number;
     char *to = (char *) law + keys[i].place;
-    *at = jlaw_word_(*at, word, sizeof word);
+    *at = jlaw_read_word_(*at, word, sizeof word);
     if (strcmp(word, keys[i].name)) return "a keyword is missing, unknown or not in its place";
-    *at = jlaw_number_(*at, &number);
+    *at = jlaw_read_number_(*at, &number);
     if (!*at || !(number >= keys[i].least && number <= keys[i].most))
       return "a parameter is no number or out of its bounds";
     const int whole_number = (int) (keys[i].is_whole ? number : 0.0);
@@ -641,60 +653,60 @@ static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
 static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
 {
   char word[sizeof law->fingerprint];
-  at = jlaw_word_(at, word, sizeof word);
+  at = jlaw_read_word_(at, word, sizeof word);
   if (strcmp(word, "fingerprint")) return "it does not tell its fingerprint";
-  at = jlaw_word_(at, law->fingerprint, sizeof law->fingerprint);
-  const char *wrong = jlaw_parse_numbers_(&at, law);
+  at = jlaw_read_word_(at, law->fingerprint, sizeof law->fingerprint);
+  const char *wrong = jlaw_parse_scalars_(&at, law);
   if (wrong) return wrong;
-  const size_t blocks = (size_t) (law->facets + JLAW_LANES - 1) / JLAW_LANES;
+  const size_t blocks = (size_t) (law->facets + JLAW_FACET_LANES - 1) / JLAW_FACET_LANES;
   const char *words[4] = {"facet", "depth", "curve", "energy"};
-  const size_t sizes[4] = {blocks * JLAW_COLUMNS * JLAW_LANES,
-                           blocks * (size_t) law->cells * JLAW_ROWS * JLAW_LANES,
+  const size_t sizes[4] = {blocks * JLAW_COLUMNS * JLAW_FACET_LANES,
+                           blocks * (size_t) law->cells * JLAW_ROWS * JLAW_FACET_LANES,
                            4 * (size_t) law->pieces, 4 * (size_t) law->pieces};
   const size_t all = sizes[0] + sizes[1] + sizes[2] + sizes[3];
   if (all > length / 2) return "its sizes do not fit one another";
-  double *to = law->own = (double *) malloc(all * sizeof *law->own);
+  double *to = law->memory = (double *) malloc(all * sizeof *law->memory);
   if (!to) return "there is no memory for it";
   for (int i = 0; i < 4; i++) {
-    at = jlaw_word_(at, word, sizeof word);
+    at = jlaw_read_word_(at, word, sizeof word);
     if (strcmp(word, words[i])) return "a table is missing, too short or too long";
     for (size_t n = 0; n < sizes[i]; n++, to++)
-      if (!(at = jlaw_number_(at, to))) return "a table holds what is no number";
+      if (!(at = jlaw_read_number_(at, to))) return "a table holds what is no number";
   }
-  law->facet = law->own, law->depth = law->facet + sizes[0];
+  law->facet = law->memory, law->depth = law->facet + sizes[0];
   law->curve = law->depth + sizes[1], law->energy = law->curve + sizes[2];
   for (size_t n = 0; n < sizes[0]; n++) { /* A and what follows it are no less than zero */
-    const size_t which = n / JLAW_LANES % JLAW_COLUMNS;
+    const size_t which = n / JLAW_FACET_LANES % JLAW_COLUMNS;
     if ((which >= JLAW_A && !(law->facet[n] >= 0.0))
         || (which == JLAW_MIRROR && !(law->facet[n] < law->facets)))
       return "a facet is out of bounds";
   }
   for (int f = 0; f < law->facets;) {
-    const double ring = jlaw_of_facet_(law, f, JLAW_RING);
-    if (!(ring >= 1.0 && ring <= (double) JLAW_AZIMUTHS && ring <= law->facets - f))
+    const double ring = jlaw_facet_value_(law, f, JLAW_RING_SIZE);
+    if (!(ring >= 1.0 && ring <= (double) JLAW_MAX_AZIMUTHS && ring <= law->facets - f))
       return "a ring of facets is out of bounds";
     f += (int) ring;
   }
-  return *jlaw_skip_(at) ? "something follows the last table" : NULL;
+  return *jlaw_skip_blanks_(at) ? "something follows the last table" : NULL;
 }
 
-static const char *jlaw_check_(char *bytes, size_t length, jlaw_law *law)
+static const char *jlaw_parse_file_(char *bytes, size_t length, jlaw_law *law)
 {
   static const char magic[] = "jointlaw tables ";
   const char *at = bytes + sizeof magic - 1;
   double version;
   if (strncmp(bytes, magic, sizeof magic - 1)) return "it is no table file of jointlaw";
-  at = jlaw_number_(at, &version);
-  if (!at || version != JLAW_FORMAT)
+  at = jlaw_read_number_(at, &version);
+  if (!at || version != JLAW_TABLE_FORMAT)
     return "it is of another version than this jointlaw.h; export law and header anew, together";
   char *end = bytes + length, word[20];
   while (end > bytes && end[-1] <= ' ' && end[-1] >= 0) end--;
   while (end > bytes && end[-1] != '\n') end--; /* to the last line */
-  const char *sum = jlaw_word_(jlaw_word_(end, word, sizeof word), word, sizeof word);
+  const char *sum = jlaw_read_word_(jlaw_read_word_(end, word, sizeof word), word, sizeof word);
   if (strncmp(end, "sum ", 4) || strspn(word, "0123456789abcdef") != 16 || word[16]
-      || *jlaw_skip_(sum))
+      || *jlaw_skip_blanks_(sum))
     return "it ends too early: copy it again, whole";
-  if (strtoull(word, NULL, 16) != jlaw_sum_of_(bytes, end))
+  if (strtoull(word, NULL, 16) != jlaw_checksum_(bytes, end))
     return "it is damaged: its sum is wrong; export it again";
   *end = 0;
   return jlaw_parse_(at, law, length);
@@ -702,24 +714,24 @@ static const char *jlaw_check_(char *bytes, size_t length, jlaw_law *law)
 
 jlaw_law *jlaw_read(const char *file, char *message, size_t size)
 {
-  jlaw_text_ text = {message, size, 0};
+  jlaw_message_ text = {message, size, 0};
   size_t length = 0;
   const char *wrong = "it cannot be read";
-  char *bytes = jlaw_load_(file, &length);
+  char *bytes = jlaw_read_bytes_(file, &length);
   jlaw_law *law = (jlaw_law *) calloc(1, sizeof *law);
-  if (bytes && law) wrong = jlaw_check_(bytes, length, law);
+  if (bytes && law) wrong = jlaw_parse_file_(bytes, length, law);
   free(bytes);
   if (!wrong) return law;
   jlaw_free(law);
-  jlaw_say_(&text, file);
-  jlaw_say_(&text, ": ");
-  jlaw_say_(&text, wrong);
+  jlaw_append_(&text, file);
+  jlaw_append_(&text, ": ");
+  jlaw_append_(&text, wrong);
   return NULL;
 }
 
 void jlaw_free(jlaw_law *law)
 {
-  if (law) free(law->own);
+  if (law) free(law->memory);
   free(law);
 }
 

@@ -1,727 +1,796 @@
-/* law.h: one step of a rock joint, and what a state amounts to, in lanes (lanes.h).
+/* law.h: one step of a rock joint and the measures of its state, written for the lanes of lanes.h.
  *
- * Symbols and order are those of docs/theory-incremental.md and of kernels/asperities.py. Rows of
- * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
- * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
- * that is gone | work that wears them; then the rows of elements.h. A batch keeps beside them Phi and
- * Phi' of every facet (M each), which saves half the look-ups, and with yielding the same at that
- * depth.
+ * Symbols and order of the step are those of docs/theory-incremental.md and kernels/asperities.py.
+ * A joint has M facets. Each has the effective closure y and D cells, which are spring-sliders in
+ * parallel (of the kind of Iwan's model) that engage at different depths zeta. Phi is the
+ * first-loading curve of a facet, G the part of Phi that a cell carries, kappa = dG/dy its
+ * stiffness, and q = (q_s, q_t) the shear force of its slider times lam.
  *
- * The last digit of expm1 and pow depends on the C library, that of all else here does not. exp and
- * log are avoided: zig links its own, which differ from those of the system. */
+ * Rows of a state, in this order:
+ *   delta (dim)          displacement from the interlocked (mated) position, m
+ *   dissipated energy    J/m2
+ *   q_s, q_t (M D each)  of all cells of all facets
+ *   z (M), plastic work  if asperities yield: plastic indentation of every facet (m), J/m2
+ *   lost slopes, work    if asperities degrade: 1 - slope retention, and the shear work behind it
+ *   rows of elements.h   bond or Coulomb's law
+ * A batch stores behind them Phi and Phi' of every facet (M each), and, if asperities yield, the same
+ * at z: batch.c.
+ *
+ * One text serves all cases. A step is compiled for several kinds (jl_step_kind), whose constants
+ * remove the parts that a law does not need; the list is at the end of the file. All lanes of a
+ * vector take all branches, and results are selected by masks. Where a quotient is undefined, a mask
+ * discards it, or the divisor is replaced by 1.
+ *
+ * Every expression is written so that rounding keeps the sign of the dissipation: a sum of terms
+ * that are each >= 0. The compiler must not fuse or reorder operations (-ffp-contract=off), so that
+ * all compilers, vector widths and hosts give the same bits. The last digit of expm1 and pow depends
+ * on the C library; exp and log are not used, because zig links versions of its own. */
 
-typedef struct { /* constants of a step: the compiler leaves out what they exclude */
-  int dim, yields, fades, wears, tangent, ledger;
-  int kept; /* whether Phi and Phi' lie beside the state */
-} jl_kind;
+typedef struct { /* constants of a step, which let the compiler omit unused parts */
+  int dim, yields, interlock_decays, degrades, tangent, track_dissipation;
+  int curve_stored; /* whether Phi and Phi' are stored behind the state */
+} jl_step_kind;
 
 typedef struct { /* in the plane of a joint: o, offset over the mating length; w^2 = 1 - |o|^2 */
-  jl_of_joint o[2], w;
-} jl_site;
+  jl_joint_real o[2], w;
+} jl_offset;
 
-typedef struct { /* a joint in a step */
-  jl_of_joint p[3], from[3],
-      to[3]; /* increment; closure and in-plane displacement before and after */
-  jl_site start, middle, end;
-  jl_of_joint had, has; /* share of the slopes that was left before the step, and is in it */
-} jl_motion;
+typedef struct {                /* a joint in a step */
+  jl_joint_real p[3];           /* increment */
+  jl_joint_real from[3], to[3]; /* closure and in-plane displacement before and after */
+  jl_offset start, middle, end;
+  jl_joint_real slopes0, slopes1; /* slope retention before the step and in it */
+} jl_joint_step;
 
-typedef struct { /* the plane of facets: slope along the azimuth e and across it, in axes (1, e) */
+typedef struct { /* planes of facets: slope along the azimuth e and across it, in axes (1, e) */
   jl_real x, z;  /* offset over the mating length along e and across */
   jl_real along, across;
-  jl_real m2, N2, rm, rmn; /* 1 + along^2, that + across^2; 1/m, 1/(m N) */
-  jl_real gamma;           /* c1 N */
+  jl_real m2, N2;        /* m^2 = 1 + along^2, N^2 = m^2 + across^2 */
+  jl_real inv_m, inv_mN; /* 1/m, 1/(m N) */
+  jl_real gamma;         /* c1 N */
 } jl_plane;
 
-typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
-  jl_real y0, y1, f0, f1, k0, k1, bend, es, et;
+typedef struct {                  /* facets in a step; 0: before, 1: after */
+  jl_real y0, y1, f0, f1, k0, k1; /* y, Phi, Phi' */
+  jl_real dk1, es, et;            /* Phi'' after; increment in the plane of the facet */
   jl_plane middle, end;
-  jl_real yw, fw, kw, limit2, worn; /* before wear: y, Phi, Phi'; after it: (q/G)^2 at most; loss */
-  jl_real d0, de, dz;               /* increment: closure, along the azimuth and across it */
-  jl_real dy, rdy;                  /* y1 - y0, and 1 over it */
-  jl_yes near;                      /* y has hardly changed */
-  jl_real z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
-  jl_real qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
-  jl_real ws, wt, open;                        /* v of the softening by z1; sum of kappa */
-  jl_real us, ut;           /* sums over the cells of q before the step, where slopes wear */
+  jl_real yw, fw, kw;                 /* y, Phi, Phi' before degradation */
+  jl_real limit2, degradation_loss;   /* after it: upper limit of (q/G)^2; dissipation */
+  jl_real d0, de, dz;                 /* increment: closure, along the azimuth and across it */
+  jl_real dy, inv_dy;                 /* y1 - y0 and its reciprocal */
+  jl_mask is_small;                   /* |dy| is too small for a difference quotient */
+  jl_real z0, z1, fz0, fz1, kz0, kz1; /* plastic indentation; Phi and Phi' there */
+  jl_real qs, qt, loss, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
+  jl_real ws, wt, kappa_sum;                   /* v of the softening by z1; sum of kappa */
+  jl_real us, ut;           /* sums over the cells of q before the step, after degradation */
   jl_real gs, gt, strength; /* derivative of q by log(gamma); mu lam A gamma */
-} jl_facets;
+} jl_facet_step;
 
-typedef struct {                /* the sliders of one depth cell of facets */
-  jl_real G0, G1, k0, k1, kz1;  /* G and kappa before and after; kappa at z1 */
-  jl_real gained;               /* what G grows by, before springs yield at the new y */
-  jl_real strength, cap, chord; /* mu lam A; friction limit; of G over the step */
-  jl_real ts, tt, unit, share;  /* trial force, 1 over its size, cap over its size or 1 */
-  jl_real old2, new2;           /* squares of q before and of the trial force */
-  jl_yes slips;
-} jl_sliders;
+typedef struct {                   /* the slider of one cell of facets in a step */
+  jl_real G0, G1, k0, k1, kz1;     /* G and kappa before and after; kappa at z1 */
+  jl_real growth;                  /* of G, before springs yield at the new y */
+  jl_real strength, limit, chord;  /* mu lam A; friction limit of q; chord of G over the step */
+  jl_real ts, tt;                  /* trial force */
+  jl_real inv_size, return_factor; /* 1/|trial force|; factor that returns it to the limit */
+  jl_real q2, trial2;              /* squares of q before the step and of the trial force */
+  jl_mask slips;
+} jl_cell_step;
 
-typedef struct { /* what facets add up to */
-  jl_real F[3], C[9], lost;
-  jl_real crushed, lowered, worn; /* plastic work; what the wear of slopes takes: normal, sliders */
-  jl_real before[2];              /* shear stress before the step, where slopes wear */
-} jl_sums;
+typedef struct { /* sums over facets */
+  jl_real F[3], C[9], loss;
+  jl_real plastic_work;
+  jl_real degradation_normal, degradation_sliders; /* energy dissipated by degradation */
+  jl_real shear0[2];                               /* shear stress before the step, after it */
+} jl_step_sums;
 
-/* Rows of a state: first of the sliders, first after them, worn slopes, elements; number of rows */
-JL_IN int jl_slider_row(const jlaw_law *law) { return law->dim + 1; }
-JL_IN int jl_rest_row(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
-JL_IN int jl_worn_row(const jlaw_law *law)
+/* Rows of a state: the first row of each part, and their number */
+JL_INLINE int jl_slider_row(const jlaw_law *law) { return law->dim + 1; }
+JL_INLINE int jl_plastic_row(const jlaw_law *law)
 {
-  return jl_rest_row(law) + (law->yields ? law->facets + 1 : 0);
+  return law->dim + 1 + 2 * law->facets * law->cells;
 }
-JL_IN int jl_element_row(const jlaw_law *law) { return jl_worn_row(law) + 2 * law->wears; }
-JL_IN int jl_state_rows(const jlaw_law *law) { return jl_element_row(law) + jl_element_rows(law); }
-
-/* Tables of facets from number `at` on, and of their first depth cell */
-JL_IN const double *jl_facet_of(const jlaw_law *law, int at)
+JL_INLINE int jl_degradation_row(const jlaw_law *law)
 {
-  const int lane = at % JLAW_LANES;
+  return jl_plastic_row(law) + (law->yields ? law->facets + 1 : 0);
+}
+JL_INLINE int jl_element_row(const jlaw_law *law)
+{
+  return jl_degradation_row(law) + 2 * law->degrades;
+}
+JL_INLINE int jl_state_rows(const jlaw_law *law)
+{
+  return jl_element_row(law) + jl_element_rows(law);
+}
+
+/* Tables of facets from index `at` on, and of the first cell of each */
+JL_INLINE const double *jl_facet_table(const jlaw_law *law, int at)
+{
+  const int lane = at % JLAW_FACET_LANES;
   return law->facet + (size_t) (at - lane) * JLAW_COLUMNS + lane;
 }
-JL_IN const double *jl_cell_of(const jlaw_law *law, int at)
+JL_INLINE const double *jl_cell_table(const jlaw_law *law, int at)
 {
-  const int lane = at % JLAW_LANES;
+  const int lane = at % JLAW_FACET_LANES;
   return law->depth + (size_t) (at - lane) * (size_t) law->cells * JLAW_ROWS + lane;
 }
 
-/* ------------------------------------------------------------------- the virgin curve */
+/* -------------------------------------------------------------- first-loading curve */
 
-/* Effective closures below it count as zero: powers and squares of them underflow */
-JL_IN jl_real jl_resolved(jl_real y) { return jl_only(jl_size_of(y) >= JLAW_UNDERFLOW, y); }
+/* Replace effective closures below JLAW_UNDERFLOW by zero: their powers and squares underflow */
+JL_INLINE jl_real jl_flush_underflow(jl_real y)
+{
+  return jl_select_or_zero(jl_abs(y) >= JLAW_UNDERFLOW, y);
+}
 
-typedef struct { /* in the tables of the virgin curve: sqrt(y), and the place x in piece i */
+typedef struct { /* position x in piece i of the tables of the first-loading curve; v = sqrt(y) */
   jl_real y, v, r, x;
-  jl_whole i;
-} jl_spot;
+  jl_int i;
+} jl_curve_point;
 
-JL_IN jl_spot jl_spot_of(const jlaw_law *law, jl_real y)
+JL_INLINE jl_curve_point jl_locate_on_curve(const jlaw_law *law, jl_real y)
 {
   const double pieces = law->pieces;
-  jl_spot at;
-  at.y = jl_only(y > 0.0, y);
-  at.v = jl_root(at.y);
-  at.r = 1.0 / (at.v + law->scale);
+  jl_curve_point at;
+  at.y = jl_select_or_zero(y > 0.0, y);
+  at.v = jl_sqrt(at.y);
+  at.r = 1.0 / (at.v + law->curve_scale);
   at.x = at.v * at.r * pieces;
-  at.i = jl_to_whole(jl_smaller(at.x, jl_each(pieces - 1.0)));
+  at.i = jl_to_int(jl_min(at.x, jl_broadcast(pieces - 1.0)));
   at.x = at.x - jl_to_real(at.i);
   return at;
 }
 
 /* x^p, zero at x = 0 */
-JL_IN jl_real jl_raised(jl_real x, double p)
+JL_INLINE jl_real jl_power(jl_real x, double p)
 {
   for (int l = 0; l < JL_W; l++) JL_LANE(x, l) = JL_LANE(x, l) > 0.0 ? pow(JL_LANE(x, l), p) : 0.0;
   return x;
 }
 
 /* y^eta, zero at y = 0 */
-JL_IN jl_real jl_power_of(const jlaw_law *law, const jl_spot *at)
+JL_INLINE jl_real jl_y_to_eta(const jlaw_law *law, const jl_curve_point *at)
 {
-  if (law->eta == 0.0) return jl_only(at->y > 0.0, jl_each(1.0));
-  return law->eta == 0.5 ? at->v : jl_raised(at->y, law->eta);
+  if (law->eta == 0.0) return jl_select_or_zero(at->y > 0.0, jl_broadcast(1.0));
+  return law->eta == 0.5 ? at->v : jl_power(at->y, law->eta);
 }
 
-/* Phi and Phi' at y, and Phi'' if asked for; zero where y <= 0 */
-JL_IN void jl_virgin_curve(const jlaw_law *law, jl_real y, jl_real *force, jl_real *slope,
-                           jl_real *bend)
+/* Phi and Phi' at y, and Phi'' unless dk is NULL; zero where y <= 0 */
+JL_INLINE void jl_first_loading_curve(const jlaw_law *law, jl_real y, jl_real *f, jl_real *k,
+                                      jl_real *dk)
 {
   const double n = law->pieces, eta = law->eta;
-  const jl_spot at = jl_spot_of(law, y);
-  const jl_real x = at.x, ts = at.v * at.r * at.r * law->scale; /* t (1 - t) */
+  const jl_curve_point at = jl_locate_on_curve(law, y);
+  const jl_real x = at.x, ts = at.v * at.r * at.r * law->curve_scale; /* t (1 - t) */
   jl_real c[4];
-  jl_fetch(law->curve, at.i, c);
+  jl_gather(law->curve, at.i, c);
   jl_real S = c[0] + x * (c[1] + x * (c[2] + x * c[3]));
   jl_real DS = 0.5 * n * ts * (c[1] + x * (2.0 * c[2] + x * (3.0 * c[3])));
-  jl_real DDS = jl_each(0.0);
-  if (bend)
+  jl_real DDS = jl_broadcast(0.0);
+  if (dk)
     DDS = 0.25 * n * n * ts * ts * (2.0 * c[2] + x * (6.0 * c[3]))
-          + 0.5 * (law->scale - at.v) * at.r * DS;
-  if (law->rise > 0.0) {
-    const jl_real w = at.y / (at.y + law->scale * law->scale), more = law->rise * (1.0 - w);
-    const jl_real up = jl_raised(w, law->rise); /* the curve is tabulated over w^rise */
-    DDS = up * (DDS + 2.0 * more * DS + more * (more - w) * S);
-    DS = up * (DS + more * S);
-    S = up * S;
+          + 0.5 * (law->curve_scale - at.v) * at.r * DS;
+  if (law->curve_exponent > 0.0) {
+    const jl_real w = at.y / (at.y + law->curve_scale * law->curve_scale),
+                  growth = law->curve_exponent * (1.0 - w);
+    const jl_real factor = jl_power(w, law->curve_exponent); /* S is tabulated over w^p */
+    DDS = factor * (DDS + 2.0 * growth * DS + growth * (growth - w) * S);
+    DS = factor * (DS + growth * S);
+    S = factor * S;
   }
-  const jl_real power = jl_power_of(law, &at);
-  *force = power * at.y * S;
-  *slope = power * ((1.0 + eta) * S + DS);
-  if (bend)
-    *bend =
-        power / jl_pick(y > 0.0, y, 1.0) * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
+  const jl_real power = jl_y_to_eta(law, &at);
+  *f = power * at.y * S;
+  *k = power * ((1.0 + eta) * S + DS);
+  if (dk)
+    *dk =
+        power / jl_select(y > 0.0, y, 1.0) * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
 }
 
 /* Psi, the integral of Phi, at y */
-JL_IN jl_real jl_psi(const jlaw_law *law, jl_real y)
+JL_INLINE jl_real jl_first_loading_energy(const jlaw_law *law, jl_real y)
 {
-  const jl_spot at = jl_spot_of(law, y);
+  const jl_curve_point at = jl_locate_on_curve(law, y);
   jl_real c[4];
-  jl_fetch(law->energy, at.i, c);
+  jl_gather(law->energy, at.i, c);
   jl_real T = c[0] + at.x * (c[1] + at.x * (c[2] + at.x * c[3]));
-  if (law->rise > 0.0) T = T * jl_raised(at.y / (at.y + law->scale * law->scale), law->rise);
-  return jl_power_of(law, &at) * at.y * at.y * T;
+  if (law->curve_exponent > 0.0)
+    T = T * jl_power(at.y / (at.y + law->curve_scale * law->curve_scale), law->curve_exponent);
+  return jl_y_to_eta(law, &at) * at.y * at.y * T;
 }
 
-/* Share G of a depth cell in Phi at y, and its slope kappa */
-JL_IN void jl_share_of(const double *cell, jl_real y, jl_real force, jl_real slope, jl_real *G,
-                       jl_real *kappa)
+/* G of a cell at y, its part of Phi, and kappa = dG/dy; asperities elastic. f, k: Phi and Phi' */
+JL_INLINE void jl_elastic_cell(const double *cell, jl_real y, jl_real f, jl_real k, jl_real *G,
+                               jl_real *kappa)
 {
-  const jl_real low = y - jl_column(cell, JLAW_LOW), high = y - jl_column(cell, JLAW_HIGH);
-  const jl_of_facet end = jl_column(cell, JLAW_KAPPA);
-  const jl_real k = jl_pick(high > 0.0, end, slope - jl_column(cell, JLAW_SLOPE));
-  const jl_real g =
-      jl_pick(high > 0.0, jl_column(cell, JLAW_G) + end * high,
-              force - jl_column(cell, JLAW_FORCE) - jl_column(cell, JLAW_SLOPE) * low);
-  *kappa = jl_only(low > 0.0, jl_larger(k, jl_each(0.0)));
-  *G = jl_larger(jl_smaller(g, *kappa * low), jl_each(0.0));
+  const jl_real from_start = y - jl_column(cell, JLAW_ZETA_START);
+  const jl_real from_end = y - jl_column(cell, JLAW_ZETA_END);
+  const jl_facet_real kappa_end = jl_column(cell, JLAW_KAPPA_END);
+  const jl_facet_real k_start = jl_column(cell, JLAW_DPHI_START);
+  const jl_real stiffness = jl_select(from_end > 0.0, kappa_end, k - k_start);
+  const jl_real force =
+      jl_select(from_end > 0.0, jl_column(cell, JLAW_G_END) + kappa_end * from_end,
+                f - jl_column(cell, JLAW_PHI_START) - k_start * from_start);
+  *kappa = jl_select_or_zero(from_start > 0.0, jl_max(stiffness, jl_broadcast(0.0)));
+  *G = jl_max(jl_min(force, *kappa * from_start), jl_broadcast(0.0));
 }
 
-/* -------------------------------------------------------------- asperities that yield */
+/* ------------------------------------------ elastic-perfectly plastic asperities */
 
-/* G and kappa of a cell, less H, its G at the flattened depth z: "Yielding" */
-JL_IN void jl_flatten(jl_real y, jl_real z, jl_real H, jl_real *G, jl_real *kappa)
+/* Subtract from G of a cell its value H at the plastic indentation z: "Yielding" */
+JL_INLINE void jl_subtract_plastic(jl_real y, jl_real z, jl_real H, jl_real *G, jl_real *kappa)
 {
-  const jl_real over = y - z;
-  *kappa = jl_only(over > 0.0, *kappa);
-  *G = jl_larger(jl_smaller(*G - H, *kappa * over), jl_each(0.0));
+  const jl_real elastic = y - z;
+  *kappa = jl_select_or_zero(elastic > 0.0, *kappa);
+  *G = jl_max(jl_min(*G - H, *kappa * elastic), jl_broadcast(0.0));
 }
 
-/* G and kappa of a cell at y, of facets with the flattened depth z */
-JL_IN void jl_hold_cell(const double *cell, jl_real y, jl_real f, jl_real k, jl_real z, jl_real fz,
-                        jl_real kz, int yields, jl_real *G, jl_real *kappa)
+/* G and kappa of a cell at y, with plastic indentation z if asperities yield */
+JL_INLINE void jl_evaluate_cell(const double *cell, jl_real y, jl_real f, jl_real k, jl_real z,
+                                jl_real fz, jl_real kz, int yields, jl_real *G, jl_real *kappa)
 {
-  jl_real H, less;
-  jl_share_of(cell, y, f, k, G, kappa);
+  jl_real H, kappa_z;
+  jl_elastic_cell(cell, y, f, k, G, kappa);
   if (!yields) return;
-  jl_share_of(cell, z, fz, kz, &H, &less);
-  jl_flatten(y, z, H, G, kappa);
+  jl_elastic_cell(cell, z, fz, kz, &H, &kappa_z);
+  jl_subtract_plastic(y, z, H, G, kappa);
 }
 
-/* Phi less its value at the flattened depth */
-JL_IN void jl_flatten_facets(jl_real y, jl_real z, jl_real less, jl_real *force, jl_real *slope)
+/* Subtract from Phi its value fz at the plastic indentation z */
+JL_INLINE void jl_subtract_plastic_force(jl_real y, jl_real z, jl_real fz, jl_real *f, jl_real *k)
 {
-  *force = jl_only(y > z, jl_larger(*force - less, jl_each(0.0)));
-  *slope = jl_only(y > z, *slope);
+  *f = jl_select_or_zero(y > z, jl_max(*f - fz, jl_broadcast(0.0)));
+  *k = jl_select_or_zero(y > z, *k);
 }
 
-/* Flattened depths of facets, before and after the step, and the virgin curve there */
-JL_IN void jl_press(const jlaw_law *law, const double *f, jl_numbers n, int kept, int at, int some,
-                    const jl_motion *m, jl_facets *o)
+/* Plastic indentation of facets before and after the step, and the first-loading curve there.
+ * curve_row: row of the stored curve, 0 if it is not stored */
+JL_INLINE void jl_update_plastic_indentation(const jlaw_law *law, const double *f, jl_states n,
+                                             int curve_row, int at, int count,
+                                             const jl_joint_step *m, jl_facet_step *o)
 {
-  const int M = law->facets, depth = jl_rest_row(law);
+  const int M = law->facets, z_row = jl_plastic_row(law);
   jl_real y = o->y1;
-  if (law->fades) /* one depth for a facet and its opposite */
-    y = jl_larger(y, 2.0 * jl_column(f, JLAW_M) * m->to[0] - y);
-  o->z0 = jl_take(n, depth + at, 1, some);
-  o->z1 = jl_larger(y - jl_column(f, JLAW_YIELD), o->z0);
-  if (kept) {
-    o->fz0 = jl_take(n, kept + 2 * M + at, 1, some);
-    o->kz0 = jl_take(n, kept + 3 * M + at, 1, some);
-  } else jl_virgin_curve(law, o->z0, &o->fz0, &o->kz0, (jl_real *) 0);
+  if (law->interlock_decays) /* a facet and the opposite one have the same indentation */
+    y = jl_max(y, 2.0 * jl_column(f, JLAW_M) * m->to[0] - y);
+  o->z0 = jl_load(n, z_row + at, 1, count);
+  o->z1 = jl_max(y - jl_column(f, JLAW_YIELD_CLOSURE), o->z0);
+  if (curve_row) {
+    o->fz0 = jl_load(n, curve_row + 2 * M + at, 1, count);
+    o->kz0 = jl_load(n, curve_row + 3 * M + at, 1, count);
+  } else jl_first_loading_curve(law, o->z0, &o->fz0, &o->kz0, (jl_real *) 0);
   o->fz1 = o->fz0, o->kz1 = o->kz0;
   if (!jl_any(o->z1 > o->z0)) return;
-  jl_virgin_curve(law, o->z1, &o->fz1, &o->kz1, (jl_real *) 0);
-  jl_put(n, depth + at, 1, some, o->z1);
-  if (kept) {
-    jl_put(n, kept + 2 * M + at, 1, some, o->fz1);
-    jl_put(n, kept + 3 * M + at, 1, some, o->kz1);
+  jl_first_loading_curve(law, o->z1, &o->fz1, &o->kz1, (jl_real *) 0);
+  jl_store(n, z_row + at, 1, count, o->z1);
+  if (curve_row) {
+    jl_store(n, curve_row + 2 * M + at, 1, count, o->fz1);
+    jl_store(n, curve_row + 3 * M + at, 1, count, o->kz1);
   }
 }
 
-/* Whether facets flatten themselves; else the opposite one does. Both do, but for rounding, where
- * the shear does not move them, as at a right angle to it. */
-JL_IN jl_yes jl_flattens_itself(const double *f, const jl_facets *o)
+/* Whether the closure of facets themselves sets their indentation; else the closure of the
+ * opposite facet does. Both are equal, but for rounding, in facets at a right angle to the shear. */
+JL_INLINE jl_mask jl_sets_own_indentation(const double *f, const jl_facet_step *o)
 {
-  return o->y1 - jl_column(f, JLAW_YIELD) >= o->z1 - JLAW_ROUNDING_TOLERANCE * jl_size_of(o->y1);
+  return o->y1 - jl_column(f, JLAW_YIELD_CLOSURE)
+         >= o->z1 - JLAW_ROUNDING_TOLERANCE * jl_abs(o->y1);
 }
 
-/* Plastic work of facets over A c1: exact where they press themselves flat, else by the mean */
-JL_IN jl_real jl_crush(const double *f, const jl_facets *o)
+/* Plastic work of facets over A c1: exact if they set their own indentation, else by the mean */
+JL_INLINE jl_real jl_plastic_work(const double *f, const jl_facet_step *o)
 {
-  const jl_of_facet most = jl_column(f, JLAW_YIELD);
-  const jl_real c0 = jl_smaller(jl_larger(o->y0 - o->z0, jl_each(0.0)), jl_each(most));
-  const jl_real c1 = jl_smaller(jl_larger(o->y1 - o->z1, jl_each(0.0)), jl_each(most));
-  return jl_pick(jl_flattens_itself(f, o), jl_each(most), 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
+  const jl_facet_real y_p = jl_column(f, JLAW_YIELD_CLOSURE);
+  const jl_real c0 = jl_min(jl_max(o->y0 - o->z0, jl_broadcast(0.0)), jl_broadcast(y_p));
+  const jl_real c1 = jl_min(jl_max(o->y1 - o->z1, jl_broadcast(0.0)), jl_broadcast(y_p));
+  return jl_select(jl_sets_own_indentation(f, o), jl_broadcast(y_p), 0.5 * (c0 + c1))
+         * (o->fz1 - o->fz0);
 }
 
-/* --------------------------------------------------------------------- slopes that fade */
+/* ---------------------------------------------------------- decay of the interlock */
 
-/* Offset, over the mating length, at the in-plane displacement p0, p1: "Mating" */
-JL_IN jl_site jl_site_of(const jlaw_law *law, jl_of_joint p0, jl_of_joint p1)
+/* Offset over the mating length at the in-plane displacement (p0, p1): "Mating" */
+JL_INLINE jl_offset jl_offset_at(const jlaw_law *law, jl_joint_real p0, jl_joint_real p1)
 {
-  jl_site at;
+  jl_offset at;
   p0 = p0 / law->mating_length;
   p1 = p1 / law->mating_length;
-  at.w = 1.0 / jl_root_joint(1.0 + (p0 * p0 + p1 * p1));
+  at.w = 1.0 / jl_sqrt_joint(1.0 + (p0 * p0 + p1 * p1));
   at.o[0] = at.w * p0;
   at.o[1] = at.w * p1;
   return at;
 }
 
-/* Effective closure of facets at this closure, where this share of the slopes is left */
-JL_IN jl_real jl_climb(const jlaw_law *law, const double *f, jl_of_joint closure, const jl_site *at,
-                       jl_of_joint slopes)
+/* Effective closure of facets. slopes: slope retention */
+JL_INLINE jl_real jl_effective_closure(const jlaw_law *law, const double *f, jl_joint_real closure,
+                                       const jl_offset *at, jl_joint_real slopes)
 {
-  const jl_real rise = jl_column(f, JLAW_M + 1) * at->o[0] + jl_column(f, JLAW_M + 2) * at->o[1];
-  return closure + slopes * law->mating_length * rise;
+  const jl_real climb = jl_column(f, JLAW_M + 1) * at->o[0] + jl_column(f, JLAW_M + 2) * at->o[1];
+  return closure + slopes * law->mating_length * climb;
 }
 
-JL_IN jl_plane jl_plane_at(const double *f, const jl_site *at, jl_of_joint slopes)
+/* Planes of facets at this offset and slope retention */
+JL_INLINE jl_plane jl_plane_at(const double *f, const jl_offset *at, jl_joint_real slopes)
 {
   jl_plane s;
   s.x = jl_column(f, JLAW_E) * at->o[0] + jl_column(f, JLAW_E + 1) * at->o[1];
   s.z = jl_column(f, JLAW_E) * at->o[1] - jl_column(f, JLAW_E + 1) * at->o[0];
-  const jl_real steep = slopes * at->w * jl_column(f, JLAW_STEEP);
-  s.along = steep * (1.0 - s.x * s.x);
-  s.across = -steep * s.x * s.z;
+  const jl_real tan_theta = slopes * at->w * jl_column(f, JLAW_TAN_THETA);
+  s.along = tan_theta * (1.0 - s.x * s.x);
+  s.across = -tan_theta * s.x * s.z;
   s.m2 = 1.0 + s.along * s.along;
   s.N2 = s.m2 + s.across * s.across;
-  const jl_real m = jl_root(s.m2), N = jl_root(s.N2);
-  s.rmn = 1.0 / (m * N);
-  s.rm = N * s.rmn;
-  s.gamma = jl_column(f, JLAW_COSINE) * N;
+  const jl_real m = jl_sqrt(s.m2), N = jl_sqrt(s.N2);
+  s.inv_mN = 1.0 / (m * N);
+  s.inv_m = N * s.inv_mN;
+  s.gamma = jl_column(f, JLAW_COS_THETA) * N;
   return s;
 }
 
-/* Components of a vector along e and across it, in the axes of the joint */
-JL_IN void jl_to_axes(const double *f, jl_real *along, jl_real *across)
+/* Rotate a vector from components along e and across it to the axes of the joint */
+JL_INLINE void jl_to_joint_axes(const double *f, jl_real *along, jl_real *across)
 {
   const jl_real v1 = jl_column(f, JLAW_E) * *along - jl_column(f, JLAW_E + 1) * *across;
   *across = jl_column(f, JLAW_E + 1) * *along + jl_column(f, JLAW_E) * *across;
   *along = v1;
 }
 
-/* Derivative of the slopes by the displacement, both along the azimuth and across: ee, ez, zz */
-JL_IN void jl_curvature(const jlaw_law *law, const double *f, const jl_plane *s, jl_of_joint w,
-                        jl_of_joint slopes, jl_real h[3])
+/* Derivatives of the slopes with respect to the displacement, along e (e) and across it (z): ee, ez,
+ * zz. w: as in jl_offset; slopes: slope retention */
+JL_INLINE void jl_slope_derivatives(const jlaw_law *law, const double *f, const jl_plane *s,
+                                    jl_joint_real w, jl_joint_real slopes, jl_real h[3])
 {
-  const jl_real bend = -(slopes * w * w / law->mating_length) * jl_column(f, JLAW_STEEP);
-  h[0] = bend * (3.0 * s->x * (1.0 - s->x * s->x));
-  h[1] = bend * (s->z * (1.0 - 3.0 * s->x * s->x));
-  h[2] = bend * (s->x * (1.0 - 3.0 * s->z * s->z));
+  const jl_real scale = -(slopes * w * w / law->mating_length) * jl_column(f, JLAW_TAN_THETA);
+  h[0] = scale * (3.0 * s->x * (1.0 - s->x * s->x));
+  h[1] = scale * (s->z * (1.0 - 3.0 * s->x * s->x));
+  h[2] = scale * (s->x * (1.0 - 3.0 * s->z * s->z));
 }
 
-/* The increment in the plane of facets at mid-step */
-JL_IN void jl_move_in_plane(const double *f, const jl_motion *m, jl_facets *o)
+/* Project the increment on the plane of facets at mid-step */
+JL_INLINE void jl_project_increment(const double *f, const jl_joint_step *m, jl_facet_step *o)
 {
   const jl_plane *s = &o->middle;
-  const jl_real p1 = jl_each(0.0) + m->p[1], p2 = jl_each(0.0) + m->p[2];
-  o->d0 = jl_each(0.0) + m->p[0];
+  const jl_real p1 = jl_broadcast(0.0) + m->p[1], p2 = jl_broadcast(0.0) + m->p[2];
+  o->d0 = jl_broadcast(0.0) + m->p[0];
   o->de = jl_column(f, JLAW_E) * p1 + jl_column(f, JLAW_E + 1) * p2;
   o->dz = jl_column(f, JLAW_E) * p2 - jl_column(f, JLAW_E + 1) * p1;
-  o->es = (o->de - s->along * o->d0) * s->rm;
-  o->et = (s->m2 * o->dz - s->across * (o->d0 + s->along * o->de)) * s->rmn;
+  o->es = (o->de - s->along * o->d0) * s->inv_m;
+  o->et = (s->m2 * o->dz - s->across * (o->d0 + s->along * o->de)) * s->inv_mN;
 }
 
-/* F of facets in a plane: A Phi n and the sliders, in axes (1, e), then in those of the joint */
-JL_IN void jl_traction_in(const jlaw_law *law, const double *f, const jl_plane *s, jl_real force,
-                          jl_real qs, jl_real qt, jl_real F[3])
+/* Traction of facets in a plane: A Phi n and the sliders, in axes (1, e), rotated to the joint's */
+JL_INLINE void jl_facet_traction(const jlaw_law *law, const double *f, const jl_plane *s,
+                                 jl_real force, jl_real qs, jl_real qt, jl_real F[3])
 {
-  const jl_real n = jl_column(f, JLAW_POTENTIAL) * force;
-  qs = law->soft * s->rm * qs;
-  qt = law->soft * s->rmn * qt;
+  const jl_real n = jl_column(f, JLAW_ENERGY_FACTOR) * force;
+  qs = law->stiffness_ratio * s->inv_m * qs;
+  qt = law->stiffness_ratio * s->inv_mN * qt;
   F[0] = n - (s->along * qs + s->across * qt);
   F[1] = n * s->along + (qs - s->along * s->across * qt);
   F[2] = n * s->across + s->m2 * qt;
-  jl_to_axes(f, &F[1], &F[2]);
+  jl_to_joint_axes(f, &F[1], &F[2]);
 }
 
-/* ------------------------------------------------------------------------------- wear */
+/* ------------------------------------------------------------- asperity degradation */
 
-/* Shares of the slopes that were left before the step, and are after the work of shear so far */
-JL_IN void jl_wear_slopes(const jlaw_law *law, jl_numbers n, jl_motion *m)
+/* Slope retention before the step and after degradation by the shear work done so far */
+JL_INLINE void jl_degrade_slopes(const jlaw_law *law, jl_states n, jl_joint_step *m)
 {
-  const int row = jl_worn_row(law);
-  jl_of_joint worn = jl_take_joint(n, row);
-  const jl_of_joint work = jl_take_joint(n, row + 1);
-  m->had = 1.0 - worn;
-  for (int l = 0; l < JL_JOINTS; l++) {
-    const double now = (law->slope_residual - 1.0) * expm1(-JL_JOINT(work, l) / law->slope_wear);
-    JL_JOINT(worn, l) = now > JL_JOINT(worn, l) ? now : JL_JOINT(worn, l);
+  const int row = jl_degradation_row(law);
+  jl_joint_real lost = jl_load_joint(n, row);
+  const jl_joint_real work = jl_load_joint(n, row + 1);
+  m->slopes0 = 1.0 - lost;
+  for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+    const double loss = (law->slope_residual - 1.0) * expm1(-JL_JOINT(work, l) / law->slope_wear);
+    JL_JOINT(lost, l) = loss > JL_JOINT(lost, l) ? loss : JL_JOINT(lost, l);
   }
-  m->has = 1.0 - worn;
-  jl_put_joint(n, row, worn);
+  m->slopes1 = 1.0 - lost;
+  jl_store_joint(n, row, lost);
 }
 
-/* Slopes have worn: springs that part take their force along, and friction limits the rest. One
- * division for all: stiffnesses and forces below 1e-75 count as none. */
-JL_IN void jl_wear_sliders(const double *cell, jl_facets *o, const jl_sliders *c, jl_real *qs,
-                           jl_real *qt, jl_kind k)
+/* Slider forces after degradation: springs that disengage release their force, and the friction limit
+ * bounds the rest. A single division serves all quotients; stiffnesses and forces whose squares are
+ * below JLAW_MIN_STIFFNESS_PRODUCT count as zero. */
+JL_INLINE void jl_degrade_sliders(const double *cell, jl_facet_step *o, const jl_cell_step *c,
+                                  jl_real *qs, jl_real *qt, jl_step_kind k)
 {
   jl_real G, kappa;
-  jl_hold_cell(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, k.yields, &G, &kappa);
-  const jl_real q2 = *qs * *qs + *qt * *qt, cap2 = o->limit2 * (c->G0 * c->G0);
-  const jl_yes had = kappa * kappa > JLAW_MIN_STIFFNESS_PRODUCT;
-  const jl_yes has = c->k0 * c->k0 > JLAW_MIN_STIFFNESS_PRODUCT;
-  const jl_real a = jl_pick(had, kappa, 1.0), b = jl_pick(has, c->k0, 1.0);
-  const jl_real Q = jl_pick(q2 > JLAW_MIN_STIFFNESS_PRODUCT, q2, 1.0);
-  const jl_real r = 1.0 / (a * b * Q), was = jl_only(had, b * Q * r), is = jl_only(has, a * Q * r);
-  jl_real share = jl_pick(kappa > c->k0, c->k0 * was, 1.0);
-  const jl_yes beyond = share * share * q2 > cap2;
-  share = jl_pick(beyond, jl_root(cap2 * (a * b * r)), share);
-  o->worn += q2 * (was - share * share * is);
-  *qs = share * *qs;
-  *qt = share * *qt;
+  jl_evaluate_cell(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, k.yields, &G, &kappa);
+  const jl_real q2 = *qs * *qs + *qt * *qt, limit2 = o->limit2 * (c->G0 * c->G0);
+  const jl_mask stiff0 = kappa * kappa > JLAW_MIN_STIFFNESS_PRODUCT,
+                stiff1 = c->k0 * c->k0 > JLAW_MIN_STIFFNESS_PRODUCT;
+  const jl_real a = jl_select(stiff0, kappa, 1.0), b = jl_select(stiff1, c->k0, 1.0);
+  const jl_real Q = jl_select(q2 > JLAW_MIN_STIFFNESS_PRODUCT, q2, 1.0);
+  const jl_real r = 1.0 / (a * b * Q);
+  const jl_real compliance0 = jl_select_or_zero(stiff0, b * Q * r);
+  const jl_real compliance1 = jl_select_or_zero(stiff1, a * Q * r);
+  jl_real factor = jl_select(kappa > c->k0, c->k0 * compliance0, 1.0);
+  const jl_mask exceeds = factor * factor * q2 > limit2;
+  factor = jl_select(exceeds, jl_sqrt(limit2 * (a * b * r)), factor);
+  o->degradation_loss += q2 * (compliance0 - factor * factor * compliance1);
+  *qs = factor * *qs;
+  *qt = factor * *qt;
 }
 
-/* ------------------------------------------------------------ what a state amounts to */
+/* ------------------------------------------------------------- measures of a state */
 
-typedef struct { /* as element.Measures; of the stored energy that of the shear springs */
-  jl_of_joint sliding, slipping, separated, stored, reach, sheared;
-} jl_amounts;
+typedef struct { /* as Measures of kernels/element.py; sheared: energy stored in shear springs */
+  jl_joint_real sliding, slipping, separated, stored, max_effective_closure, sheared;
+} jl_measures;
 
 typedef struct {
   jl_real sliding, slipping, separated, normal, sheared;
-} jl_amount_sums;
+} jl_measure_sums;
 
-JL_IN jl_amount_sums jl_no_amounts(void)
+JL_INLINE jl_measure_sums jl_zero_measures(void)
 {
-  const jl_amount_sums none = {jl_each(0.0), jl_each(0.0), jl_each(0.0), jl_each(0.0),
-                               jl_each(0.0)};
+  const jl_measure_sums none = {jl_broadcast(0.0), jl_broadcast(0.0), jl_broadcast(0.0),
+                                jl_broadcast(0.0), jl_broadcast(0.0)};
   return none;
 }
 
-/* Facets from number `at` on, as jl_facets_now leaves them */
-JL_IN void jl_measure_facets(const jlaw_law *law, jl_numbers n, int at, const jl_facets *o,
-                             jl_amount_sums *sum)
+/* Add the measures of facets from index `at` on, which jl_evaluate_facets evaluated */
+JL_INLINE void jl_measure_facets(const jlaw_law *law, jl_states n, int at, const jl_facet_step *o,
+                                 jl_measure_sums *sum)
 {
-  const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
-  const double *f = jl_facet_of(law, at), *cell = jl_cell_of(law, at);
-  jl_real held = jl_each(0.0), sheared = held, slips = jl_each(1.0); /* G of cells at their limit */
-  for (int i = 0; i < D && jl_any(o->y1 > jl_column(cell, JLAW_LOW)); i++) {
+  const int M = law->facets, D = law->cells,
+            count = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
+  const double *f = jl_facet_table(law, at), *cell = jl_cell_table(law, at);
+  jl_real limited_G = jl_broadcast(0.0),
+          sheared = limited_G;        /* G of cells at their friction limit */
+  jl_real slides = jl_broadcast(1.0); /* 1 if all cells are at it */
+  for (int i = 0; i < D && jl_any(o->y1 > jl_column(cell, JLAW_ZETA_START)); i++) {
     jl_real G, kappa;
     const int row = jl_slider_row(law) + at * D + i;
-    const jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
+    const jl_real qs = jl_load(n, row, D, count), qt = jl_load(n, row + M * D, D, count);
     const jl_real q2 = qs * qs + qt * qt;
-    jl_hold_cell(cell, o->y1, o->f1, o->k1, o->z1, o->fz1, o->kz1, law->yields, &G, &kappa);
-    const jl_yes stiff = kappa > JLAW_MIN_DIVISOR;
-    const jl_yes limited =
-        jl_root(q2) >= o->strength
-                           * (G * (1.0 - JLAW_FRICTION_TOLERANCE)
-                              - JLAW_ROUNDING_TOLERANCE * o->f1);
-    held += jl_only(limited, G);
-    slips = jl_only(limited, slips);
-    sheared += jl_only(stiff, q2 / jl_pick(stiff, kappa, 1.0));
-    cell += JLAW_ROWS * JLAW_LANES;
+    jl_evaluate_cell(cell, o->y1, o->f1, o->k1, o->z1, o->fz1, o->kz1, law->yields, &G, &kappa);
+    const jl_mask stiff = kappa > JLAW_MIN_DIVISOR;
+    const jl_mask limited =
+        jl_sqrt(q2)
+        >= o->strength * (G * (1.0 - JLAW_FRICTION_TOLERANCE) - JLAW_ROUNDING_TOLERANCE * o->f1);
+    limited_G += jl_select_or_zero(limited, G);
+    slides = jl_select_or_zero(limited, slides);
+    sheared += jl_select_or_zero(stiff, q2 / jl_select(stiff, kappa, 1.0));
+    cell += JLAW_ROWS * JLAW_FACET_LANES;
   }
-  const jl_yes touches = o->y1 > o->z1;
-  const jl_real force = jl_only(touches, jl_larger(o->f1 - o->fz1, jl_each(0.0))),
-                share = jl_each(jl_column(f, JLAW_SHARE));
-  const jl_real part = jl_only(force > 0.0, held / jl_pick(force > 0.0, force, 1.0));
-  sum->sliding += share * jl_only(touches, slips);
-  sum->slipping += share * jl_smaller(part, jl_each(1.0));
-  sum->separated += share * jl_pick(touches, 0.0, 1.0);
-  jl_real normal = jl_psi(law, o->y1);
-  if (law->yields) normal = normal - jl_psi(law, o->z1) - o->fz1 * (o->y1 - o->z1);
-  sum->normal += jl_column(f, JLAW_POTENTIAL) * jl_only(touches, jl_larger(normal, jl_each(0.0)));
-  sum->sheared += jl_column(f, JLAW_COMPLIANCE) * sheared;
+  const jl_mask touches = o->y1 > o->z1;
+  const jl_real force = jl_select_or_zero(touches, jl_max(o->f1 - o->fz1, jl_broadcast(0.0))),
+                weight = jl_broadcast(jl_column(f, JLAW_WEIGHT));
+  const jl_real slipping =
+      jl_select_or_zero(force > 0.0, limited_G / jl_select(force > 0.0, force, 1.0));
+  sum->sliding += weight * jl_select_or_zero(touches, slides);
+  sum->slipping += weight * jl_min(slipping, jl_broadcast(1.0));
+  sum->separated += weight * jl_select(touches, 0.0, 1.0);
+  jl_real normal = jl_first_loading_energy(law, o->y1);
+  if (law->yields) normal = normal - jl_first_loading_energy(law, o->z1) - o->fz1 * (o->y1 - o->z1);
+  sum->normal += jl_column(f, JLAW_ENERGY_FACTOR)
+                 * jl_select_or_zero(touches, jl_max(normal, jl_broadcast(0.0)));
+  sum->sheared += jl_column(f, JLAW_SLIDER_COMPLIANCE) * sheared;
 }
 
 /* --------------------------------------------------------------------------- one step */
 
-/* G and kappa of a cell before and after the step. What G gains is taken from the virgin curve: the
- * bounds of jl_flatten would show in it where that curve is small and hardly convex. */
-JL_IN void jl_cells_of(const double *cell, const jl_facets *o, jl_sliders *c, int yields)
+/* G and kappa of a cell before and after the step. The growth of G is computed from the first-loading
+ * curve: the bounds in jl_subtract_plastic would distort it where the curve is small and nearly
+ * linear. */
+JL_INLINE void jl_evaluate_cell_step(const double *cell, const jl_facet_step *o, jl_cell_step *c,
+                                     int yields)
 {
-  jl_share_of(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);
-  jl_share_of(cell, o->y1, o->f1, o->k1, &c->G1, &c->k1);
-  c->gained = c->G1 - c->G0;
-  c->kz1 = jl_each(0.0);
+  jl_elastic_cell(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);
+  jl_elastic_cell(cell, o->y1, o->f1, o->k1, &c->G1, &c->k1);
+  c->growth = c->G1 - c->G0;
+  c->kz1 = jl_broadcast(0.0);
   if (!yields) return;
   jl_real H0, H1, kz0;
-  jl_share_of(cell, o->z0, o->fz0, o->kz0, &H0, &kz0);
-  jl_share_of(cell, o->z1, o->fz1, o->kz1, &H1, &c->kz1);
-  c->gained = c->G1 - jl_larger(c->G0, H0);
-  jl_flatten(o->y0, o->z0, H0, &c->G0, &c->k0);
-  jl_flatten(o->y1, o->z1, H1, &c->G1, &c->k1);
+  jl_elastic_cell(cell, o->z0, o->fz0, o->kz0, &H0, &kz0);
+  jl_elastic_cell(cell, o->z1, o->fz1, o->kz1, &H1, &c->kz1);
+  c->growth = c->G1 - jl_max(c->G0, H0);
+  jl_subtract_plastic(o->y0, o->z0, H0, &c->G0, &c->k0);
+  jl_subtract_plastic(o->y1, o->z1, H1, &c->G1, &c->k1);
 }
 
-/* Trial force: loaded by the chord of G where kappa grows; where kappa falls, the springs that part
- * take their force along. Then the friction limit, |q| <= mu lam A G. */
-JL_IN void jl_load(const double *f, const jl_facets *o, jl_sliders *c, jl_real *qs, jl_real *qt,
-                   jl_kind k)
+/* Trial force of a slider and its return to the friction limit, |q| <= mu lam A gamma G. Where kappa
+ * grows the trial force grows by the chord of G over the step; where kappa falls, the springs that
+ * disengage release their force. */
+JL_INLINE void jl_map_to_friction_limit(const double *f, const jl_facet_step *o, jl_cell_step *c,
+                                        jl_real *qs, jl_real *qt, jl_step_kind k)
 {
-  jl_yes near = o->near;
-  if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0)); /* flattened ones touch together */
-  const jl_real mean = jl_pick(near, 0.5 * (c->k0 + c->k1), c->gained * o->rdy);
-  c->chord = jl_smaller(jl_larger(mean, c->k0), c->k1); /* k1 where it falls */
-  c->old2 = *qs * *qs + *qt * *qt;
-  const jl_yes falls = c->k1 < c->k0;
-  const jl_real kept = jl_pick(falls, c->k1 / jl_pick(falls, c->k0, 1.0), 1.0);
-  *qs = *qs * kept;
-  *qt = *qt * kept;
-  const jl_real add = jl_column(f, JLAW_STIFF) * c->chord;
-  c->ts = *qs + add * o->es;
-  c->tt = *qt + add * o->et;
-  c->new2 = c->ts * c->ts + c->tt * c->tt;
-  c->cap = c->strength * c->G1;
-  c->slips = c->new2 > c->cap * c->cap;
-  c->unit = jl_each(0.0);
-  c->share = jl_each(1.0);
-  if (k.tangent || jl_somewhere(c->slips)) {
-    c->unit = jl_only(c->new2 > JLAW_MIN_DIVISOR, 1.0 / jl_root(c->new2));
-    c->share = jl_pick(c->slips, jl_smaller(c->cap * c->unit, jl_each(1.0)), 1.0);
+  jl_mask use_mean = o->is_small;
+  if (k.yields) /* plastic springs of a cell engage at the same closure: then G is not smooth */
+    use_mean = use_mean & ((c->k0 > 0.0) | (c->k1 <= 0.0));
+  const jl_real mean = jl_select(use_mean, 0.5 * (c->k0 + c->k1), c->growth * o->inv_dy);
+  c->chord = jl_min(jl_max(mean, c->k0), c->k1); /* k1 where it falls */
+  c->q2 = *qs * *qs + *qt * *qt;
+  const jl_mask falls = c->k1 < c->k0;
+  const jl_real retained = jl_select(falls, c->k1 / jl_select(falls, c->k0, 1.0), 1.0);
+  *qs = *qs * retained;
+  *qt = *qt * retained;
+  const jl_real stiffness = jl_column(f, JLAW_SHEAR_STIFFNESS) * c->chord;
+  c->ts = *qs + stiffness * o->es;
+  c->tt = *qt + stiffness * o->et;
+  c->trial2 = c->ts * c->ts + c->tt * c->tt;
+  c->limit = c->strength * c->G1;
+  c->slips = c->trial2 > c->limit * c->limit;
+  c->inv_size = jl_broadcast(0.0);
+  c->return_factor = jl_broadcast(1.0);
+  if (k.tangent || jl_any_to_compute(c->slips)) {
+    c->inv_size = jl_select_or_zero(c->trial2 > JLAW_MIN_DIVISOR, 1.0 / jl_sqrt(c->trial2));
+    c->return_factor = jl_select(c->slips, jl_min(c->limit * c->inv_size, jl_broadcast(1.0)), 1.0);
   }
-  const jl_real part =
-      jl_only(c->new2 > JLAW_MIN_DIVISOR, c->share); /* squares of smaller forces underflow */
-  *qs = part * c->ts;
-  *qt = part * c->tt;
+  const jl_real factor = /* squares of smaller forces underflow: the force counts as zero */
+      jl_select_or_zero(c->trial2 > JLAW_MIN_DIVISOR, c->return_factor);
+  *qs = factor * c->ts;
+  *qt = factor * c->tt;
 }
 
-/* What sliders, and springs that part under shear, lose: every term is >= 0 as written */
-JL_IN jl_real jl_friction_loss(const jl_sliders *c)
+/* Energy that slip of the sliders, and springs that disengage under shear, dissipate; every term is
+ * >= 0 also in floating point */
+JL_INLINE jl_real jl_friction_loss(const jl_cell_step *c)
 {
-  const jl_real high = jl_larger(c->chord, c->k0), low = jl_smaller(c->k0, c->k1);
+  const jl_real high = jl_max(c->chord, c->k0), low = jl_min(c->k0, c->k1);
   const jl_real a = c->k0 * high, b = c->k1 * c->chord;
-  const jl_real A = jl_pick(a > JLAW_MIN_STIFFNESS_PRODUCT, a, 1.0);
-  const jl_real B = jl_pick(b > JLAW_MIN_STIFFNESS_PRODUCT, b, 1.0);
+  const jl_real A = jl_select(a > JLAW_MIN_STIFFNESS_PRODUCT, a, 1.0),
+                B = jl_select(b > JLAW_MIN_STIFFNESS_PRODUCT, b, 1.0);
   const jl_real r = 1.0 / (A * B); /* one division for both */
-  const jl_real rub = c->share * (c->share * (c->k1 - c->chord) + 2.0 * (1.0 - c->share) * c->k1);
-  return jl_only(a > JLAW_MIN_STIFFNESS_PRODUCT, c->old2 * ((high - low) * (B * r)))
-         + jl_only(b > JLAW_MIN_STIFFNESS_PRODUCT, c->new2 * (rub * (A * r)));
+  const jl_real slip =
+      c->return_factor
+      * (c->return_factor * (c->k1 - c->chord) + 2.0 * (1.0 - c->return_factor) * c->k1);
+  return jl_select_or_zero(a > JLAW_MIN_STIFFNESS_PRODUCT, c->q2 * ((high - low) * (B * r)))
+         + jl_select_or_zero(b > JLAW_MIN_STIFFNESS_PRODUCT, c->trial2 * (slip * (A * r)));
 }
 
-/* "The tangent": J_q = beta (I - s s^T) E + v g^T of sliders */
-JL_IN void jl_slide_tangent(const double *f, const double *cell, const jl_sliders *c, jl_facets *o,
-                            jl_kind k)
+/* Add the tangent of a slider, J_q = beta (I - s s^T) E + v g^T: "The tangent" */
+JL_INLINE void jl_add_slider_tangent(const double *f, const double *cell, const jl_cell_step *c,
+                                     jl_facet_step *o, jl_step_kind k)
 {
-  const jl_of_facet a = jl_column(f, JLAW_STIFF);
-  const jl_of_facet begin = jl_column(cell, JLAW_LOW), end = jl_column(cell, JLAW_HIGH);
-  const jl_yes inside = (o->y1 > begin) & (o->y1 < end);
-  const jl_real bend = jl_only(inside, o->bend);
-  jl_yes near = o->near;
-  if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0));
-  const jl_real chord1 = jl_pick(near, 0.5 * bend, (c->k1 - c->chord) * o->rdy);
-  const jl_yes stiff = c->k1 > JLAW_MIN_DIVISOR;
-  const jl_real fade = jl_only(stiff, bend / jl_pick(stiff, c->k1, 1.0));
-  /* rounding must not decide: what did not close has not grown, what is at its limit slips */
-  const jl_yes stiffer = (c->k1 > c->k0) & (o->dy > JLAW_ROUNDING_TOLERANCE * jl_size_of(o->y1));
-  const jl_real least = c->strength
-                        * (c->G1 * (1.0 - JLAW_FRICTION_TOLERANCE)
-                           - JLAW_ROUNDING_TOLERANCE * o->f1);
-  const jl_yes limited = c->new2 >= jl_larger(least, jl_each(0.0)) * jl_larger(least, jl_each(0.0));
-  const jl_real vs = jl_pick(stiffer, a * chord1 * o->es, fade * c->ts);
-  const jl_real vt = jl_pick(stiffer, a * chord1 * o->et, fade * c->tt);
-  const jl_real us = c->ts * c->unit, ut = c->tt * c->unit;
+  const jl_facet_real a = jl_column(f, JLAW_SHEAR_STIFFNESS);
+  const jl_facet_real start = jl_column(cell, JLAW_ZETA_START),
+                      end = jl_column(cell, JLAW_ZETA_END);
+  const jl_mask inside = (o->y1 > start) & (o->y1 < end);
+  const jl_real dkappa = jl_select_or_zero(inside, o->dk1);
+  jl_mask use_mean = o->is_small;
+  if (k.yields) use_mean = use_mean & ((c->k0 > 0.0) | (c->k1 <= 0.0));
+  const jl_real chord1 = jl_select(use_mean, 0.5 * dkappa, (c->k1 - c->chord) * o->inv_dy);
+  const jl_mask stiff = c->k1 > JLAW_MIN_DIVISOR;
+  const jl_real decay = jl_select_or_zero(stiff, dkappa / jl_select(stiff, c->k1, 1.0));
+  /* make the branch independent of rounding: without closure a cell does not stiffen, and a slider at
+   * its limit slips */
+  const jl_mask stiffer = (c->k1 > c->k0) & (o->dy > JLAW_ROUNDING_TOLERANCE * jl_abs(o->y1));
+  const jl_real slip_force =
+      c->strength * (c->G1 * (1.0 - JLAW_FRICTION_TOLERANCE) - JLAW_ROUNDING_TOLERANCE * o->f1);
+  const jl_mask limited =
+      c->trial2 >= jl_max(slip_force, jl_broadcast(0.0)) * jl_max(slip_force, jl_broadcast(0.0));
+  const jl_real vs = jl_select(stiffer, a * chord1 * o->es, decay * c->ts);
+  const jl_real vt = jl_select(stiffer, a * chord1 * o->et, decay * c->tt);
+  const jl_real us = c->ts * c->inv_size, ut = c->tt * c->inv_size;
   const jl_real dot = us * vs + ut * vt, push = c->strength * c->k1;
-  const jl_real beta = jl_only(c->cap > 0.0, c->share * (a * c->chord)),
-                along = jl_only(limited, beta);
-  o->vs += jl_pick(limited, c->share * (vs - us * dot) + push * us, vs);
-  o->vt += jl_pick(limited, c->share * (vt - ut * dot) + push * ut, vt);
+  const jl_real beta = jl_select_or_zero(c->limit > 0.0, c->return_factor * (a * c->chord)),
+                along = jl_select_or_zero(limited, beta);
+  o->vs += jl_select(limited, c->return_factor * (vs - us * dot) + push * us, vs);
+  o->vt += jl_select(limited, c->return_factor * (vt - ut * dot) + push * ut, vt);
   o->bss += beta - along * us * us;
   o->bst -= along * us * ut;
   o->btt += beta - along * ut * ut;
-  if (k.fades) {
-    const jl_real by_gamma = jl_only(limited, c->strength * c->G1);
+  if (k.interlock_decays) {
+    const jl_real by_gamma = jl_select_or_zero(limited, c->strength * c->G1);
     o->gs += by_gamma * us;
     o->gt += by_gamma * ut;
   }
   if (k.yields) {
-    const jl_yes pulls = limited & (c->k1 > 0.0);
-    const jl_real pull = c->strength * jl_only(pulls, c->kz1);
-    o->ws += pull * us;
-    o->wt += pull * ut;
-    o->open += c->k1;
+    const jl_mask softens = limited & (c->k1 > 0.0);
+    const jl_real softening = c->strength * jl_select_or_zero(softens, c->kz1);
+    o->ws += softening * us;
+    o->wt += softening * ut;
+    o->kappa_sum += c->k1;
   }
 }
 
-/* One depth cell of facets: from the sliders before the step to those after it */
-JL_IN void jl_slide(const double *f, const double *cell, jl_facets *o, jl_real *qs, jl_real *qt,
-                    jl_kind k)
+/* Advance the slider of one cell of facets */
+JL_INLINE void jl_step_cell(const double *f, const double *cell, jl_facet_step *o, jl_real *qs,
+                            jl_real *qt, jl_step_kind k)
 {
-  jl_sliders c;
-  jl_cells_of(cell, o, &c, k.yields);
+  jl_cell_step c;
+  jl_evaluate_cell_step(cell, o, &c, k.yields);
   c.strength = o->strength;
-  if (k.wears) {
-    jl_wear_sliders(cell, o, &c, qs, qt, k);
+  if (k.degrades) {
+    jl_degrade_sliders(cell, o, &c, qs, qt, k);
     o->us += *qs;
     o->ut += *qt;
   }
-  jl_load(f, o, &c, qs, qt, k);
+  jl_map_to_friction_limit(f, o, &c, qs, qt, k);
   o->qs += *qs;
   o->qt += *qt;
-  if (k.ledger) o->lost += jl_friction_loss(&c);
-  if (k.tangent) jl_slide_tangent(f, cell, &c, o, k);
+  if (k.track_dissipation) o->loss += jl_friction_loss(&c);
+  if (k.tangent) jl_add_slider_tangent(f, cell, &c, o, k);
 }
 
-/* C += along g^T + E^T B E of facets; where the flattened depth moves, less softening g_z^T */
-JL_IN void jl_add_tangent(const jlaw_law *law, const double *f, const jl_facets *o, jl_sums *sum,
-                          jl_kind k)
+/* C += along g^T + E^T B E of facets, minus softening g_z^T where the plastic indentation grows */
+JL_INLINE void jl_add_tangent(const jlaw_law *law, const double *f, const jl_facet_step *o,
+                              jl_step_sums *sum, jl_step_kind k)
 {
-  const jl_yes moves = (o->z1 - o->z0 > JLAW_ROUNDING_TOLERANCE * o->z1) & (o->open > 0.0);
-  const jl_yes own = jl_flattens_itself(f, o);
+  const jl_mask indents = (o->z1 - o->z0 > JLAW_ROUNDING_TOLERANCE * o->z1) & (o->kappa_sum > 0.0);
+  const jl_mask own = jl_sets_own_indentation(f, o);
   for (int i = 0; i < k.dim; i++) {
-    const jl_of_facet n = jl_column(f, JLAW_N + i) * jl_column(f, JLAW_A);
-    const jl_of_facet s = jl_column(f, JLAW_S + i) * law->soft,
-                      t = jl_column(f, JLAW_T + i) * law->soft;
+    const jl_facet_real n = jl_column(f, JLAW_N + i) * jl_column(f, JLAW_A);
+    const jl_facet_real s = jl_column(f, JLAW_S + i) * law->stiffness_ratio,
+                        t = jl_column(f, JLAW_T + i) * law->stiffness_ratio;
     const jl_real along = n * o->k1 + s * o->vs + t * o->vt;
     const jl_real left = s * o->bss + t * o->bst, right = s * o->bst + t * o->btt;
     for (int j = 0; j < k.dim; j++) {
-      const jl_real g = jl_each(jl_column(f, JLAW_M + j)); /* dy/dd */
-      jl_real to = along * g + left * jl_column(f, JLAW_S + j) + right * jl_column(f, JLAW_T + j);
+      const jl_real g = jl_broadcast(jl_column(f, JLAW_M + j)); /* dy/dd */
+      jl_real C_ij = along * g + left * jl_column(f, JLAW_S + j) + right * jl_column(f, JLAW_T + j);
       if (k.yields) {
-        const jl_real less = jl_only(moves, n * o->kz1 + s * o->ws + t * o->wt);
-        to -= j > 0 ? less * jl_pick(own, g, -g) : less * g;
+        const jl_real softening = jl_select_or_zero(indents, n * o->kz1 + s * o->ws + t * o->wt);
+        C_ij -= j > 0 ? softening * jl_select(own, g, -g) : softening * g;
       }
-      sum->C[3 * i + j] += to;
+      sum->C[3 * i + j] += C_ij;
     }
   }
 }
 
-/* The same where slopes fade, and with them planes turn and friction limits fall: worked out in
- * axes (1, e), then turned. E: derivative of the increment in the plane; A, B: of the sliders'
- * force by the slopes along and across; h: of these by the displacement. */
-JL_IN void jl_add_fading_tangent(const jlaw_law *law, const double *f, const jl_motion *m,
-                                 const jl_facets *o, jl_sums *sum, jl_kind k)
+/* Add the tangent of facets whose interlock decays: with slip their planes rotate and their friction
+ * limits fall. It is computed in axes (1, e), then rotated. Es, Et: derivative of the increment in the
+ * plane with respect to d; A, B: derivative of the slider force with respect to the slopes along and
+ * across; h, H: derivatives of the slopes with respect to the displacement, at the end and mid-step. */
+JL_INLINE void jl_add_decaying_tangent(const jlaw_law *law, const double *f, const jl_joint_step *m,
+                                       const jl_facet_step *o, jl_step_sums *sum, jl_step_kind k)
 {
-  const jl_yes moves = (o->z1 - o->z0 > JLAW_ROUNDING_TOLERANCE * o->z1) & (o->open > 0.0);
-  const jl_yes own = jl_flattens_itself(f, o);
+  const jl_mask indents = (o->z1 - o->z0 > JLAW_ROUNDING_TOLERANCE * o->z1) & (o->kappa_sum > 0.0);
+  const jl_mask own = jl_sets_own_indentation(f, o);
   const jl_plane *s = &o->end, *r = &o->middle;
-  const jl_real soft = jl_each(law->soft), none = jl_each(0.0),
-                n = jl_each(jl_column(f, JLAW_POTENTIAL));
+  const jl_real ratio = jl_broadcast(law->stiffness_ratio), none = jl_broadcast(0.0),
+                n = jl_broadcast(jl_column(f, JLAW_ENERGY_FACTOR));
   jl_real h[3], H[3], C[3][3]; /* ee, ez, zz */
-  jl_curvature(law, f, s, m->end.w, m->has, h);
-  jl_curvature(law, f, r, m->middle.w, m->has, H);
+  jl_slope_derivatives(law, f, s, m->end.w, m->slopes1, h);
+  jl_slope_derivatives(law, f, r, m->middle.w, m->slopes1, H);
   const jl_real turn = 0.5 * (o->d0 + r->along * o->de), et = 0.5 * o->et;
   const jl_real rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
-  const jl_real ea = -turn * (rm2 * r->rm), eb = -(turn * r->rmn + et * r->across * rN2);
+  const jl_real ea = -turn * (rm2 * r->inv_m), eb = -(turn * r->inv_mN + et * r->across * rN2);
   const jl_real ta =
-      (r->along * o->dz - 0.5 * r->across * o->de) * r->rmn - et * r->along * (rm2 + rN2);
-  const jl_real Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
-  const jl_real Et[3] = {-r->across * r->rmn,
-                         -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
-                         r->m2 * r->rmn + ta * H[1] + eb * H[2]};
-  const jl_real cs[3] = {-s->along * s->rm, s->rm, none};
-  const jl_real ct[3] = {-s->across * s->rmn, -s->along * s->across * s->rmn, s->m2 * s->rmn};
-  const jl_real rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->rm;
-  const jl_real qa = o->qs * rm3, qt = o->qt * s->rmn, fall = s->along * (rM2 + rn2);
+      (r->along * o->dz - 0.5 * r->across * o->de) * r->inv_mN - et * r->along * (rm2 + rN2);
+  const jl_real Es[3] = {-r->along * r->inv_m, r->inv_m + ea * H[0], ea * H[1]};
+  const jl_real Et[3] = {-r->across * r->inv_mN,
+                         -r->along * r->across * r->inv_mN + ta * H[0] + eb * H[1],
+                         r->m2 * r->inv_mN + ta * H[1] + eb * H[2]};
+  const jl_real cs[3] = {-s->along * s->inv_m, s->inv_m, none};
+  const jl_real ct[3] = {-s->across * s->inv_mN, -s->along * s->across * s->inv_mN,
+                         s->m2 * s->inv_mN};
+  const jl_real rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->inv_m;
+  const jl_real qa = o->qs * rm3, qt = o->qt * s->inv_mN, fall = s->along * (rM2 + rn2);
   const jl_real A[3] = {-qa - o->qt * ct[0] * fall,
                         -s->along * qa - s->across * qt - o->qt * ct[1] * fall,
                         2.0 * s->along * qt - o->qt * ct[2] * fall};
   const jl_real down = o->qt * s->across * rn2;
   const jl_real B[3] = {-qt - down * ct[0], -s->along * qt - down * ct[1], -down * ct[2]};
   const jl_real ga = s->along * rn2, gb = s->across * rn2; /* of log(gamma) */
-  const jl_real g[3] = {jl_each(1.0), s->along, s->across};
+  const jl_real g[3] = {jl_broadcast(1.0), s->along, s->across};
   for (int j = 0; j < 3; j++) {
     const jl_real ha = j ? h[j - 1] : none, hb = j ? h[j] : none, gamma = ga * ha + gb * hb;
     const jl_real us = o->vs * g[j] + o->bss * Es[j] + o->bst * Et[j] + o->gs * gamma;
     const jl_real ut = o->vt * g[j] + o->bst * Es[j] + o->btt * Et[j] + o->gt * gamma;
-    const jl_real pressing = k.yields ? jl_only(moves, j ? jl_pick(own, g[j], -g[j]) : g[j]) : none;
+    const jl_real g_z =
+        k.yields ? jl_select_or_zero(indents, j ? jl_select(own, g[j], -g[j]) : g[j]) : none;
     for (int i = 0; i < 3; i++) {
-      const jl_real bend = i == 1 ? ha : i == 2 ? hb : none;
-      C[i][j] = n * (o->k1 * g[i] * g[j] + o->f1 * bend)
-                + soft * (cs[i] * us + ct[i] * ut + (A[i] * ha + B[i] * hb));
-      if (k.yields)
-        C[i][j] -= pressing * (n * g[i] * o->kz1 + soft * (cs[i] * o->ws + ct[i] * o->wt));
+      const jl_real dslope = i == 1 ? ha : i == 2 ? hb : none;
+      C[i][j] = n * (o->k1 * g[i] * g[j] + o->f1 * dslope)
+                + ratio * (cs[i] * us + ct[i] * ut + (A[i] * ha + B[i] * hb));
+      if (k.yields) C[i][j] -= g_z * (n * g[i] * o->kz1 + ratio * (cs[i] * o->ws + ct[i] * o->wt));
     }
   }
-  for (int i = 0; i < 3; i++) jl_to_axes(f, &C[i][1], &C[i][2]);
-  for (int j = 0; j < 3; j++) jl_to_axes(f, &C[1][j], &C[2][j]);
+  for (int i = 0; i < 3; i++) jl_to_joint_axes(f, &C[i][1], &C[i][2]);
+  for (int j = 0; j < 3; j++) jl_to_joint_axes(f, &C[1][j], &C[2][j]);
   for (int i = 0; i < k.dim; i++)
     for (int j = 0; j < k.dim; j++) sum->C[3 * i + j] += C[i][j];
 }
 
-/* Facets from number `at` on: closures, virgin curve, sliders, and their part of F and C; and, where
- * `seen` is given, of what the state then amounts to */
-JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_numbers n,
-                          jl_sums *sum, jl_kind k, jl_amount_sums *seen)
+/* Advance facets from index `at` on: effective closure, first-loading curve, sliders. Adds their part
+ * of F, C and the dissipated energy to `sum`, and of the measures unless `measures` is NULL. */
+JL_INLINE void jl_step_facets(const jlaw_law *law, int at, const jl_joint_step *m, jl_states n,
+                              jl_step_sums *sum, jl_step_kind k, jl_measure_sums *measures)
 {
-  const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
-  const int kept = k.kept ? jl_state_rows(law) : 0;
-  const double *f = jl_facet_of(law, at), *cell = jl_cell_of(law, at);
-  jl_facets o;
-  o.y0 = o.y1 = o.es = o.et = o.bend = o.limit2 = o.fw = o.kw = jl_each(0.0);
-  for (int i = 0; i < k.dim && !k.fades; i++) {
+  const int M = law->facets, D = law->cells,
+            count = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
+  const int curve_row = k.curve_stored ? jl_state_rows(law) : 0;
+  const double *f = jl_facet_table(law, at), *cell = jl_cell_table(law, at);
+  jl_facet_step o;
+  o.y0 = o.y1 = o.es = o.et = o.dk1 = o.limit2 = o.fw = o.kw = jl_broadcast(0.0);
+  for (int i = 0; i < k.dim && !k.interlock_decays; i++) {
     o.y0 += jl_column(f, JLAW_M + i) * m->from[i];
     o.y1 += jl_column(f, JLAW_M + i) * m->to[i];
     o.es += jl_column(f, JLAW_S + i) * m->p[i];
     if (i > 0) o.et += jl_column(f, JLAW_T + i) * m->p[i];
   }
-  if (k.fades) {
-    o.y0 = jl_climb(law, f, m->from[0], &m->start, m->has);
-    o.y1 = jl_climb(law, f, m->to[0], &m->end, m->has);
+  if (k.interlock_decays) {
+    o.y0 = jl_effective_closure(law, f, m->from[0], &m->start, m->slopes1);
+    o.y1 = jl_effective_closure(law, f, m->to[0], &m->end, m->slopes1);
   }
-  o.yw = k.wears ? jl_resolved(jl_climb(law, f, m->from[0], &m->start, m->had)) : o.y0;
+  o.yw = k.degrades
+             ? jl_flush_underflow(jl_effective_closure(law, f, m->from[0], &m->start, m->slopes0))
+             : o.y0;
   if (!k.yields && !jl_any((o.y0 > 0.0) | (o.y1 > 0.0) | (o.yw > 0.0))) {
-    if (seen) seen->separated += jl_column(f, JLAW_SHARE);
-    return; /* apart: holds zero */
+    if (measures) measures->separated += jl_column(f, JLAW_WEIGHT);
+    return; /* separated: no force */
   }
-  if (k.fades) {
-    o.middle = jl_plane_at(f, &m->middle, m->has);
-    o.end = jl_plane_at(f, &m->end, m->has);
-    jl_move_in_plane(f, m, &o);
+  if (k.interlock_decays) {
+    o.middle = jl_plane_at(f, &m->middle, m->slopes1);
+    o.end = jl_plane_at(f, &m->end, m->slopes1);
+    jl_project_increment(f, m, &o);
   }
-  const jl_of_facet limit = jl_column(f, JLAW_STRENGTH) * jl_column(f, JLAW_COSINE);
+  const jl_facet_real limit = jl_column(f, JLAW_FRICTION_LIMIT) * jl_column(f, JLAW_COS_THETA);
   jl_plane start;
-  if (k.wears) {
-    start = jl_plane_at(f, &m->start, m->has);
+  if (k.degrades) {
+    start = jl_plane_at(f, &m->start, m->slopes1);
     o.limit2 = limit * limit * start.N2;
   }
-  o.y0 = jl_resolved(o.y0);
-  o.y1 = jl_resolved(o.y1);
+  o.y0 = jl_flush_underflow(o.y0);
+  o.y1 = jl_flush_underflow(o.y1);
   o.dy = o.y1 - o.y0;
-  o.rdy = 1.0 / o.dy;
-  o.near = jl_size_of(o.dy) <= JLAW_MIN_CHORD_STEP * jl_size_of(o.y1);
-  o.qs = o.qt = o.lost = o.vs = o.vt = o.bss = o.bst = o.btt = o.ws = o.wt = o.open = jl_each(0.0);
-  o.gs = o.gt = o.us = o.ut = o.worn = jl_each(0.0);
-  if (k.kept) {
-    o.f0 = jl_take(n, kept + at, 1, some);
-    o.k0 = jl_take(n, kept + M + at, 1, some);
-  } else jl_virgin_curve(law, o.yw, &o.f0, &o.k0, (jl_real *) 0);
-  if (k.wears) {
+  o.inv_dy = 1.0 / o.dy;
+  o.is_small = jl_abs(o.dy) <= JLAW_MIN_CHORD_STEP * jl_abs(o.y1);
+  o.qs = o.qt = o.loss = o.vs = o.vt = o.bss = o.bst = o.btt = o.ws = o.wt = o.kappa_sum =
+      jl_broadcast(0.0);
+  o.gs = o.gt = o.us = o.ut = o.degradation_loss = jl_broadcast(0.0);
+  if (k.curve_stored) {
+    o.f0 = jl_load(n, curve_row + at, 1, count);
+    o.k0 = jl_load(n, curve_row + M + at, 1, count);
+  } else jl_first_loading_curve(law, o.yw, &o.f0, &o.k0, (jl_real *) 0);
+  if (k.degrades) {
     o.fw = o.f0, o.kw = o.k0;
-    if (jl_somewhere(o.y0 != o.yw)) jl_virgin_curve(law, o.y0, &o.f0, &o.k0, (jl_real *) 0);
+    if (jl_any_to_compute(o.y0 != o.yw))
+      jl_first_loading_curve(law, o.y0, &o.f0, &o.k0, (jl_real *) 0);
   }
-  jl_virgin_curve(law, o.y1, &o.f1, &o.k1, k.tangent ? &o.bend : (jl_real *) 0);
-  if (k.kept) {
-    jl_put(n, kept + at, 1, some, o.f1);
-    jl_put(n, kept + M + at, 1, some, o.k1);
+  jl_first_loading_curve(law, o.y1, &o.f1, &o.k1, k.tangent ? &o.dk1 : (jl_real *) 0);
+  if (k.curve_stored) {
+    jl_store(n, curve_row + at, 1, count, o.f1);
+    jl_store(n, curve_row + M + at, 1, count, o.k1);
   }
-  o.z0 = o.z1 = o.fz0 = o.fz1 = o.kz0 = o.kz1 = jl_each(0.0);
-  if (k.yields) jl_press(law, f, n, kept, at, some, m, &o);
-  o.strength = jl_each(jl_column(f, JLAW_STRENGTH));
-  if (k.fades) o.strength = o.strength * o.end.gamma;
-  for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
-    const jl_of_facet low = jl_column(cell, JLAW_LOW);
-    if (!jl_any((o.y0 > low) | (o.y1 > low) | (o.yw > low))) break; /* nor does what is deeper */
+  o.z0 = o.z1 = o.fz0 = o.fz1 = o.kz0 = o.kz1 = jl_broadcast(0.0);
+  if (k.yields) jl_update_plastic_indentation(law, f, n, curve_row, at, count, m, &o);
+  o.strength = jl_broadcast(jl_column(f, JLAW_FRICTION_LIMIT));
+  if (k.interlock_decays) o.strength = o.strength * o.end.gamma;
+  for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_FACET_LANES) {
+    const jl_facet_real zeta = jl_column(cell, JLAW_ZETA_START);
+    if (!jl_any((o.y0 > zeta) | (o.y1 > zeta) | (o.yw > zeta)))
+      break; /* nor do deeper cells touch */
     const int row = k.dim + 1 + at * D + i;
-    jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
-    jl_slide(f, cell, &o, &qs, &qt, k);
-    jl_put(n, row, D, some, qs);
-    jl_put(n, row + M * D, D, some, qt);
+    jl_real qs = jl_load(n, row, D, count), qt = jl_load(n, row + M * D, D, count);
+    jl_step_cell(f, cell, &o, &qs, &qt, k);
+    jl_store(n, row, D, count, qs);
+    jl_store(n, row + M * D, D, count, qt);
   }
-  if (seen) jl_measure_facets(law, n, at, &o, seen);
+  if (measures) jl_measure_facets(law, n, at, &o, measures);
   if (k.yields) {
-    sum->crushed += jl_column(f, JLAW_POTENTIAL) * jl_crush(f, &o);
-    if (k.wears) jl_flatten_facets(o.yw, o.z0, o.fz0, &o.fw, &o.kw);
-    jl_flatten_facets(o.y0, o.z0, o.fz0, &o.f0, &o.k0);
-    jl_flatten_facets(o.y1, o.z1, o.fz1, &o.f1, &o.k1);
+    sum->plastic_work += jl_column(f, JLAW_ENERGY_FACTOR) * jl_plastic_work(f, &o);
+    if (k.degrades) jl_subtract_plastic_force(o.yw, o.z0, o.fz0, &o.fw, &o.kw);
+    jl_subtract_plastic_force(o.y0, o.z0, o.fz0, &o.f0, &o.k0);
+    jl_subtract_plastic_force(o.y1, o.z1, o.fz1, &o.f1, &o.k1);
   }
-  if (k.ledger) sum->lost += jl_column(f, JLAW_COMPLIANCE) * o.lost;
-  if (k.wears) {
-    sum->worn += jl_column(f, JLAW_COMPLIANCE) * o.worn;
-    sum->lowered += 0.5 * jl_column(f, JLAW_POTENTIAL) * ((o.fw + o.f0) * (o.yw - o.y0));
+  if (k.track_dissipation) sum->loss += jl_column(f, JLAW_SLIDER_COMPLIANCE) * o.loss;
+  if (k.degrades) {
+    sum->degradation_sliders += jl_column(f, JLAW_SLIDER_COMPLIANCE) * o.degradation_loss;
+    sum->degradation_normal +=
+        0.5 * jl_column(f, JLAW_ENERGY_FACTOR) * ((o.fw + o.f0) * (o.yw - o.y0));
     jl_real F[3];
-    jl_traction_in(law, f, &start, o.f0, o.us, o.ut, F);
-    sum->before[0] += F[1], sum->before[1] += F[2];
+    jl_facet_traction(law, f, &start, o.f0, o.us, o.ut, F);
+    sum->shear0[0] += F[1], sum->shear0[1] += F[2];
   }
-  if (k.fades) {
+  if (k.interlock_decays) {
     jl_real F[3];
-    jl_traction_in(law, f, &o.end, o.f1, o.qs, o.qt, F);
+    jl_facet_traction(law, f, &o.end, o.f1, o.qs, o.qt, F);
     for (int i = 0; i < k.dim; i++) sum->F[i] += F[i];
-    if (k.tangent) jl_add_fading_tangent(law, f, m, &o, sum, k);
+    if (k.tangent) jl_add_decaying_tangent(law, f, m, &o, sum, k);
     return;
   }
-  const jl_real normal = jl_column(f, JLAW_A) * o.f1, qs = law->soft * o.qs, qt = law->soft * o.qt;
+  const jl_real normal = jl_column(f, JLAW_A) * o.f1, qs = law->stiffness_ratio * o.qs,
+                qt = law->stiffness_ratio * o.qt;
   for (int i = 0; i < k.dim; i++) {
-    const jl_real pull = jl_column(f, JLAW_N + i) * normal;
-    sum->F[i] += pull + (jl_column(f, JLAW_S + i) * qs + jl_column(f, JLAW_T + i) * qt);
+    const jl_real normal_i = jl_column(f, JLAW_N + i) * normal;
+    sum->F[i] += normal_i + (jl_column(f, JLAW_S + i) * qs + jl_column(f, JLAW_T + i) * qt);
   }
   if (k.tangent) jl_add_tangent(law, f, &o, sum, k);
 }
 
-/* Amounts of joints from the sums over their facets */
-JL_IN void jl_add_up(const jl_amount_sums *sum, jl_amounts *all)
+/* Measures of joints from the partial sums over their facets */
+JL_INLINE void jl_sum_measures(const jl_measure_sums *sum, jl_measures *all)
 {
   all->sliding = jl_total(sum, sliding);
   all->slipping = jl_total(sum, slipping);
@@ -730,229 +799,242 @@ JL_IN void jl_add_up(const jl_amount_sums *sum, jl_amounts *all)
   all->stored = jl_total(sum, normal) + all->sheared;
 }
 
-/* Advance joints by the increments d: their numbers n, F (dim), and C (dim, dim) for a tangent; what
- * they then amount to, but for `reach`, where `all` is given */
-JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl_of_joint F[3],
-                   jl_of_joint C[9], jl_kind k, jl_amounts *all)
+/* Advance the asperities of joints by the increments d (dim): states n, traction F (dim), and C (dim,
+ * dim) for a tangent. Writes the measures after the step, without max_effective_closure, unless `all`
+ * is NULL. */
+JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3],
+                       jl_joint_real F[3], jl_joint_real C[9], jl_step_kind k, jl_measures *all)
 {
-  const int dim = k.dim, M = law->facets, rest = jl_rest_row(law);
-  jl_motion m;
-  jl_sums sum[JL_SUMS];
+  const int dim = k.dim, M = law->facets, plastic_row = jl_plastic_row(law);
+  jl_joint_step m;
+  jl_step_sums sum[JL_PARTIAL_SUMS];
   for (int i = 0; i < 3; i++) {
-    m.p[i] = i < dim ? d[i] : jl_each_joint(0.0);
-    m.from[i] = i < dim ? jl_take_joint(n, i) : jl_each_joint(0.0);
+    m.p[i] = i < dim ? d[i] : jl_broadcast_joint(0.0);
+    m.from[i] = i < dim ? jl_load_joint(n, i) : jl_broadcast_joint(0.0);
     m.to[i] = m.from[i] + m.p[i];
   }
-  m.had = m.has = jl_each_joint(1.0);
-  if (k.wears) jl_wear_slopes(law, n, &m);
-  if (k.fades) {
-    m.start = jl_site_of(law, m.from[1], m.from[2]);
-    m.middle = jl_site_of(law, m.from[1] + 0.5 * m.p[1], m.from[2] + 0.5 * m.p[2]);
-    m.end = jl_site_of(law, m.to[1], m.to[2]);
+  m.slopes0 = m.slopes1 = jl_broadcast_joint(1.0);
+  if (k.degrades) jl_degrade_slopes(law, n, &m);
+  if (k.interlock_decays) {
+    m.start = jl_offset_at(law, m.from[1], m.from[2]);
+    m.middle = jl_offset_at(law, m.from[1] + 0.5 * m.p[1], m.from[2] + 0.5 * m.p[2]);
+    m.end = jl_offset_at(law, m.to[1], m.to[2]);
   }
-  for (int i = 0; i < JL_SUMS; i++) {
-    for (int j = 0; j < 3; j++) sum[i].F[j] = jl_each(0.0);
-    for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = jl_each(0.0);
-    sum[i].lost = sum[i].crushed = sum[i].lowered = sum[i].worn = jl_each(0.0);
-    sum[i].before[0] = sum[i].before[1] = jl_each(0.0);
+  for (int i = 0; i < JL_PARTIAL_SUMS; i++) {
+    for (int j = 0; j < 3; j++) sum[i].F[j] = jl_broadcast(0.0);
+    for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = jl_broadcast(0.0);
+    sum[i].loss = sum[i].plastic_work = sum[i].degradation_normal = sum[i].degradation_sliders =
+        jl_broadcast(0.0);
+    sum[i].shear0[0] = sum[i].shear0[1] = jl_broadcast(0.0);
   }
-  jl_amount_sums seen[JL_SUMS];
-  for (int i = 0; all && i < JL_SUMS; i++) seen[i] = jl_no_amounts();
-  for (int at = 0; at < M; at += JL_TOGETHER) {
-    const int i = at / JL_TOGETHER % JL_SUMS;
-    jl_step_facets(law, at, &m, n, sum + i, k, all ? seen + i : (jl_amount_sums *) 0);
+  jl_measure_sums measures[JL_PARTIAL_SUMS];
+  for (int i = 0; all && i < JL_PARTIAL_SUMS; i++) measures[i] = jl_zero_measures();
+  for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
+    const int i = at / JL_FACETS_PER_PASS % JL_PARTIAL_SUMS;
+    jl_step_facets(law, at, &m, n, sum + i, k, all ? measures + i : (jl_measure_sums *) 0);
   }
-  if (all) jl_add_up(seen, all);
+  if (all) jl_sum_measures(measures, all);
   for (int i = 0; i < dim; i++) {
     F[i] = jl_total(sum, F[i]);
     for (int j = 0; k.tangent && j < dim; j++) C[dim * i + j] = jl_total(sum, C[3 * i + j]);
-    jl_put_joint(n, i, m.to[i]);
+    jl_store_joint(n, i, m.to[i]);
   }
-  if (!k.ledger) return;
-  jl_of_joint lost = jl_total(sum, lost);
-  if (k.wears) {
-    jl_of_joint lowered = jl_total(sum, lowered), work = jl_each_joint(0.0);
-    for (int i = 1; i < dim; i++) work += 0.5 * (jl_total(sum, before[i - 1]) + F[i]) * m.p[i];
-    for (int l = 0; l < JL_JOINTS; l++) { /* what wears is work of the joint's own shear */
-      const double shear = fabs(JL_JOINT(work, l)), rubbed = JL_JOINT(lost, l);
-      JL_JOINT(work, l) = shear < rubbed ? shear : rubbed;
-      /* >= 0 by the pairs of facets, but for rounding */
-      JL_JOINT(lowered, l) = JL_JOINT(lowered, l) > 0.0 ? JL_JOINT(lowered, l) : 0.0;
+  if (!k.track_dissipation) return;
+  jl_joint_real dissipated = jl_total(sum, loss);
+  if (k.degrades) {
+    jl_joint_real normal = jl_total(sum, degradation_normal), work = jl_broadcast_joint(0.0);
+    for (int i = 1; i < dim; i++) work += 0.5 * (jl_total(sum, shear0[i - 1]) + F[i]) * m.p[i];
+    for (int l = 0; l < JL_JOINTS_PER_PASS;
+         l++) { /* only work of the joint's own shear degrades asperities */
+      const double shear = fabs(JL_JOINT(work, l)), friction = JL_JOINT(dissipated, l);
+      JL_JOINT(work, l) = shear < friction ? shear : friction;
+      /* >= 0 in the sum over opposite facets, but for rounding */
+      JL_JOINT(normal, l) = JL_JOINT(normal, l) > 0.0 ? JL_JOINT(normal, l) : 0.0;
     }
-    jl_put_joint(n, jl_worn_row(law) + 1, jl_take_joint(n, jl_worn_row(law) + 1) + work);
-    lost += jl_total(sum, worn) + lowered;
+    jl_store_joint(n, jl_degradation_row(law) + 1,
+                   jl_load_joint(n, jl_degradation_row(law) + 1) + work);
+    dissipated += jl_total(sum, degradation_sliders) + normal;
   }
   if (k.yields) {
-    const jl_of_joint crushed = jl_total(sum, crushed);
-    jl_put_joint(n, rest + M, jl_take_joint(n, rest + M) + crushed);
-    lost += crushed;
+    const jl_joint_real plastic_work = jl_total(sum, plastic_work);
+    jl_store_joint(n, plastic_row + M, jl_load_joint(n, plastic_row + M) + plastic_work);
+    dissipated += plastic_work;
   }
-  jl_put_joint(n, dim, jl_take_joint(n, dim) + lost);
+  jl_store_joint(n, dim, jl_load_joint(n, dim) + dissipated);
 }
 
-/* ------------------------------------------------------------------ what a state is */
+/* ------------------------------------------------------------- evaluation of a state */
 
-/* Facets from number `at` on in a state: y, z, and the virgin curve there as in y1 and z1; the
- * friction limit of q over G */
-JL_IN void jl_facets_now(const jlaw_law *law, jl_numbers n, int at, jl_facets *o)
+/* Evaluate facets from index `at` on in a state: y1, z1, and the first-loading curve at both;
+ * strength, the friction limit of q over G */
+JL_INLINE void jl_evaluate_facets(const jlaw_law *law, jl_states n, int at, jl_facet_step *o)
 {
-  const int some = law->facets - at < JL_TOGETHER ? law->facets - at : JL_TOGETHER;
-  const double *f = jl_facet_of(law, at);
-  jl_of_joint slopes = jl_each_joint(1.0), to[3];
-  for (int i = 0; i < 3; i++) to[i] = i < law->dim ? jl_take_joint(n, i) : jl_each_joint(0.0);
-  if (law->wears) slopes = 1.0 - jl_take_joint(n, jl_worn_row(law));
-  o->y1 = o->z1 = o->fz1 = o->kz1 = jl_each(0.0);
-  o->strength = jl_each(jl_column(f, JLAW_STRENGTH));
-  for (int i = 0; i < law->dim && !law->fades; i++) o->y1 += jl_column(f, JLAW_M + i) * to[i];
-  if (law->fades) {
-    const jl_site here = jl_site_of(law, to[1], to[2]);
-    o->y1 = jl_climb(law, f, to[0], &here, slopes);
+  const int count = law->facets - at < JL_FACETS_PER_PASS ? law->facets - at : JL_FACETS_PER_PASS;
+  const double *f = jl_facet_table(law, at);
+  jl_joint_real slopes = jl_broadcast_joint(1.0), to[3];
+  for (int i = 0; i < 3; i++) to[i] = i < law->dim ? jl_load_joint(n, i) : jl_broadcast_joint(0.0);
+  if (law->degrades) slopes = 1.0 - jl_load_joint(n, jl_degradation_row(law));
+  o->y1 = o->z1 = o->fz1 = o->kz1 = jl_broadcast(0.0);
+  o->strength = jl_broadcast(jl_column(f, JLAW_FRICTION_LIMIT));
+  for (int i = 0; i < law->dim && !law->interlock_decays; i++)
+    o->y1 += jl_column(f, JLAW_M + i) * to[i];
+  if (law->interlock_decays) {
+    const jl_offset here = jl_offset_at(law, to[1], to[2]);
+    o->y1 = jl_effective_closure(law, f, to[0], &here, slopes);
     o->strength = o->strength * jl_plane_at(f, &here, slopes).gamma;
   }
-  o->y1 = jl_resolved(o->y1);
-  jl_virgin_curve(law, o->y1, &o->f1, &o->k1, (jl_real *) 0);
+  o->y1 = jl_flush_underflow(o->y1);
+  jl_first_loading_curve(law, o->y1, &o->f1, &o->k1, (jl_real *) 0);
   if (!law->yields) return;
-  o->z1 = jl_take(n, jl_rest_row(law) + at, 1, some);
-  jl_virgin_curve(law, o->z1, &o->fz1, &o->kz1, (jl_real *) 0);
+  o->z1 = jl_load(n, jl_plastic_row(law) + at, 1, count);
+  jl_first_loading_curve(law, o->z1, &o->fz1, &o->kz1, (jl_real *) 0);
 }
 
-/* Adds what the elements beside the asperities, or in place of them, amount to */
-JL_IN void jl_add_elements(const jlaw_law *law, jl_numbers n, jl_of_joint stored, jl_amounts *all)
+/* Add the energy stored in the elements of elements.h to the measures; Coulomb's law sets the others */
+JL_INLINE void jl_add_element_measures(const jlaw_law *law, jl_states n, jl_joint_real stored,
+                                       jl_measures *all)
 {
   all->stored += stored;
-  for (int l = 0; law->coulomb && l < JL_JOINTS; l++) {
-    double shares[3];
-    jl_coulomb_shares(law, n.s + l, n.stride, shares);
-    JL_JOINT(all->sliding, l) = shares[0], JL_JOINT(all->slipping, l) = shares[1];
-    JL_JOINT(all->separated, l) = shares[2], JL_JOINT(all->reach, l) = n.s[l];
+  for (int l = 0; law->coulomb && l < JL_JOINTS_PER_PASS; l++) {
+    double fractions[3];
+    jl_coulomb_fractions(law, n.s + l, n.stride, fractions);
+    JL_JOINT(all->sliding, l) = fractions[0], JL_JOINT(all->slipping, l) = fractions[1];
+    JL_JOINT(all->separated, l) = fractions[2], JL_JOINT(all->max_effective_closure, l) = n.s[l];
   }
 }
 
-JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
+/* Measures of joints in their present states */
+JL_INLINE jl_measures jl_measure(const jlaw_law *law, jl_states n)
 {
   const int M = law->facets;
-  jl_amount_sums sum[JL_SUMS];
-  jl_amounts all;
-  all.reach = jl_each_joint(-DBL_MAX);
-  for (int i = 0; i < JL_SUMS; i++) sum[i] = jl_no_amounts();
-  for (int at = 0; at < M; at += JL_TOGETHER) {
-    jl_facets o;
-    jl_facets_now(law, n, at, &o);
-    jl_measure_facets(law, n, at, &o, sum + at / JL_TOGETHER % JL_SUMS);
-#ifdef JLAW_ABREAST
-    for (int l = 0; l < JL_TOGETHER && at + l < M; l++)
-      all.reach = all.reach > o.y1[l] ? all.reach : o.y1[l];
+  jl_measure_sums sum[JL_PARTIAL_SUMS];
+  jl_measures all;
+  all.max_effective_closure = jl_broadcast_joint(-DBL_MAX);
+  for (int i = 0; i < JL_PARTIAL_SUMS; i++) sum[i] = jl_zero_measures();
+  for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
+    jl_facet_step o;
+    jl_evaluate_facets(law, n, at, &o);
+    jl_measure_facets(law, n, at, &o, sum + at / JL_FACETS_PER_PASS % JL_PARTIAL_SUMS);
+#ifdef JLAW_FACET_VECTORS
+    for (int l = 0; l < JL_FACETS_PER_PASS && at + l < M; l++)
+      all.max_effective_closure =
+          all.max_effective_closure > o.y1[l] ? all.max_effective_closure : o.y1[l];
 #else
-    all.reach = jl_larger(all.reach, o.y1);
+    all.max_effective_closure = jl_max(all.max_effective_closure, o.y1);
 #endif
   }
-  jl_add_up(sum, &all);
+  jl_sum_measures(sum, &all);
   if (!jl_element_rows(law)) return all;
-  jl_of_joint here[3], still[3];
-  for (int i = 0; i < law->dim; i++) here[i] = jl_take_joint(n, i), still[i] = jl_each_joint(0.0);
-  const jl_of_joint stored =
-      jl_step_elements(law, n, jl_element_row(law), here, still, NULL, NULL, 0, 0);
-  jl_add_elements(law, n, stored, &all);
+  jl_joint_real delta[3], zero[3];
+  for (int i = 0; i < law->dim; i++)
+    delta[i] = jl_load_joint(n, i), zero[i] = jl_broadcast_joint(0.0);
+  const jl_joint_real stored =
+      jl_step_elements(law, n, jl_element_row(law), delta, zero, NULL, NULL, 0, 0);
+  jl_add_element_measures(law, n, stored, &all);
   return all;
 }
 
-/* Bound of |C| over A/c1 of a facet with this Phi', less what slopes that fade add */
-JL_IN jl_real jl_stiffness_over(const jlaw_law *law, jl_real slope)
+/* Upper bound of |C| over A/c1 of a facet with this Phi', without the part of decaying slopes */
+JL_INLINE jl_real jl_facet_stiffness_bound(const jlaw_law *law, jl_real slope)
 {
-  const double stick = law->soft > 1.0 ? law->soft : 1.0;
-  const jl_real joins = jl_smaller(law->joining_more * slope, jl_each(law->joining_most));
-  return (stick + law->mu) * slope + law->mu * joins;
+  const double stick = law->stiffness_ratio > 1.0 ? law->stiffness_ratio : 1.0;
+  const jl_real engagement = jl_min(law->engagement_stiffness_factor * slope,
+                                    jl_broadcast(law->engagement_stiffness_limit));
+  return (stick + law->mu) * slope + law->mu * engagement;
 }
 
-/* Bound of |C| (Pa/m) of joints as they are */
-JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
+/* Upper bound of |C| (Pa/m) of joints in their present states */
+JL_INLINE jl_joint_real jl_stiffness_bound(const jlaw_law *law, jl_states n)
 {
-  const double turn = JLAW_MAX_OFFSET_CURVATURE / law->mating_length;
+  const double rotation = JLAW_MAX_OFFSET_CURVATURE / law->mating_length;
   struct {
     jl_real bound;
-  } sum[JL_SUMS];
-  for (int i = 0; i < JL_SUMS; i++) sum[i].bound = jl_each(0.0);
-  for (int at = 0; at < law->facets; at += JL_TOGETHER) {
-    const double *f = jl_facet_of(law, at);
-    const jl_of_facet c1 = jl_column(f, JLAW_COSINE);
-    jl_facets o;
-    jl_facets_now(law, n, at, &o);
-    jl_real bound = jl_column(f, JLAW_STIFF) * jl_stiffness_over(law, o.k1);
-    if (law->fades)
-      bound += turn * jl_column(f, JLAW_A) * jl_column(f, JLAW_STEEP) * (c1 + law->mu * (1.0 + c1))
-               * o.f1;
-    sum[at / JL_TOGETHER % JL_SUMS].bound += bound;
+  } sum[JL_PARTIAL_SUMS];
+  for (int i = 0; i < JL_PARTIAL_SUMS; i++) sum[i].bound = jl_broadcast(0.0);
+  for (int at = 0; at < law->facets; at += JL_FACETS_PER_PASS) {
+    const double *f = jl_facet_table(law, at);
+    const jl_facet_real c1 = jl_column(f, JLAW_COS_THETA);
+    jl_facet_step o;
+    jl_evaluate_facets(law, n, at, &o);
+    jl_real bound = jl_column(f, JLAW_SHEAR_STIFFNESS) * jl_facet_stiffness_bound(law, o.k1);
+    if (law->interlock_decays)
+      bound += rotation * jl_column(f, JLAW_A) * jl_column(f, JLAW_TAN_THETA)
+               * (c1 + law->mu * (1.0 + c1)) * o.f1;
+    sum[at / JL_FACETS_PER_PASS % JL_PARTIAL_SUMS].bound += bound;
   }
-  jl_of_joint bound = jl_total(sum, bound);
-  for (int l = 0; l < JL_JOINTS; l++)
-    JL_JOINT(bound, l) += jl_stiffness_of_elements(law, n.s + l, jl_element_row(law), n.stride);
+  jl_joint_real bound = jl_total(sum, bound);
+  for (int l = 0; l < JL_JOINTS_PER_PASS; l++)
+    JL_JOINT(bound, l) += jl_elements_stiffness_bound(law, n.s + l, jl_element_row(law), n.stride);
   return bound;
 }
 
-/* ------------------------------------------------------------- kinds of a step */
+/* ------------------------------------------------------------------ kinds of a step */
 
-/* The step, compiled for each kind. A plane costs half of space; a tangent, a ledger or `all` that is
- * not asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger.
- * Batches (JL_BATCH) have each kind with a ledger and without one, kinds of their own for slopes that
- * wear, and a function for each: compilers find registers for one kind at a time. The header has
- * fewer kinds, for the memory that compiling takes, and never asks for `all`. */
+/* The step is compiled for several kinds. A step in a plane costs half of a step in space, and a
+ * tangent, the dissipated energy or measures that are not requested cost nothing. Yielding and
+ * degrading asperities always need the dissipated energy. Batches (JL_BATCH) have kinds with and
+ * without it, kinds for degrading asperities, and one function per kind, because compilers allocate
+ * registers better for one kind at a time. The header has fewer kinds, which limits the memory of the
+ * compiler, and never computes measures in a step. */
 #ifdef JL_BATCH
-#define JL_OF_KIND static __attribute__((noinline))
+#define JL_STEP_FUNCTION static __attribute__((noinline))
 #else
 #define JL_BATCH 0
-#define JL_OF_KIND JL_IN
+#define JL_STEP_FUNCTION JL_INLINE
 #endif
-#define JL_STEP_AS(name, tangent, seen, ...)                                                \
-  JL_OF_KIND void jl_step_##name(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], \
-                                 jl_of_joint F[3], jl_of_joint C[9], int ledger, int kept,  \
-                                 jl_amounts *all)                                           \
-  {                                                                                         \
-    const jl_kind plain = {__VA_ARGS__, tangent, 0, kept};                                  \
-    const jl_kind k = {__VA_ARGS__, tangent, JL_BATCH || ledger, kept};                     \
-    if (!(seen)) all = NULL;                                                                \
-    if (JL_BATCH && !ledger && !k.wears) jl_step(law, n, d, F, C, plain, all);              \
-    else jl_step(law, n, d, F, C, k, all);                                                  \
+#define JL_DEFINE_STEP(name, tangent, measured, ...)                                               \
+  JL_STEP_FUNCTION void jl_step_##name(const jlaw_law *law, jl_states n, const jl_joint_real d[3], \
+                                       jl_joint_real F[3], jl_joint_real C[9],                     \
+                                       int track_dissipation, int curve_stored, jl_measures *all)  \
+  {                                                                                                \
+    const jl_step_kind untracked = {__VA_ARGS__, tangent, 0, curve_stored};                        \
+    const jl_step_kind k = {__VA_ARGS__, tangent, JL_BATCH || track_dissipation, curve_stored};    \
+    if (!(measured)) all = NULL;                                                                   \
+    if (JL_BATCH && !track_dissipation && !k.degrades) jl_step(law, n, d, F, C, untracked, all);   \
+    else jl_step(law, n, d, F, C, k, all);                                                         \
   }
-#define JL_KIND(name, ...)                   \
-  JL_STEP_AS(name, 0, 0, __VA_ARGS__)        \
-  JL_STEP_AS(name##_seen, 0, 1, __VA_ARGS__) \
-  JL_STEP_AS(name##_C, 1, 0, __VA_ARGS__)
-JL_KIND(plane, 2, 0, 0, 0)
-JL_KIND(plane_fades, 2, 0, 1, 0)
-JL_KIND(plane_wears, 2, 0, 1, 1)
-JL_KIND(space, 3, 0, 0, 0)
-JL_KIND(space_fades, 3, 0, 1, 0)
-JL_KIND(space_wears, 3, 0, 1, 1)
-JL_KIND(rare, law->dim, law->yields, 0, 0) /* asperities yield, or closure only */
-JL_KIND(rare_fades, law->dim, law->yields, 1, law->wears)
+#define JL_DEFINE_STEPS(name, ...)                   \
+  JL_DEFINE_STEP(name, 0, 0, __VA_ARGS__)            \
+  JL_DEFINE_STEP(name##_measured, 0, 1, __VA_ARGS__) \
+  JL_DEFINE_STEP(name##_C, 1, 0, __VA_ARGS__)
+JL_DEFINE_STEPS(plane, 2, 0, 0, 0)
+JL_DEFINE_STEPS(plane_decaying, 2, 0, 1, 0)
+JL_DEFINE_STEPS(plane_degrading, 2, 0, 1, 1)
+JL_DEFINE_STEPS(space, 3, 0, 0, 0)
+JL_DEFINE_STEPS(space_decaying, 3, 0, 1, 0)
+JL_DEFINE_STEPS(space_degrading, 3, 0, 1, 1)
+JL_DEFINE_STEPS(general, law->dim, law->yields, 0, 0) /* asperities yield, or closure only */
+JL_DEFINE_STEPS(general_decaying, law->dim, law->yields, 1, law->degrades)
 
-/* What joints then amount to is asked for by `all`, not together with a tangent */
-JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3],
-                           jl_of_joint F[3], jl_of_joint C[9], int ledger, int tangent, int kept,
-                           jl_amounts *all)
+/* Advance joints with all their elements by the step of their kind. Measures are written unless `all`
+ * is NULL, which it must be for a tangent. */
+JL_INLINE void jl_step_of_kind(const jlaw_law *law, jl_states n, const jl_joint_real d[3],
+                               jl_joint_real F[3], jl_joint_real C[9], int track_dissipation,
+                               int tangent, int curve_stored, jl_measures *all)
 {
-  const int dim = law->dim, y = law->yields, w = law->wears;
-  jl_of_joint from[3];
-  for (int i = 0; i < dim; i++) from[i] = jl_take_joint(n, i);
-  ledger = ledger || y || w;
-#define JL_STEP(name)                                                        \
-  {                                                                          \
-    if (tangent) jl_step_##name##_C(law, n, d, F, C, ledger, kept, all);     \
-    else if (JL_BATCH && all)                                                \
-      jl_step_##name##_seen(law, n, d, F, C, ledger, kept, all);             \
-    else jl_step_##name(law, n, d, F, C, ledger, kept, all);                 \
+  const int dim = law->dim, yields = law->yields, degrades = law->degrades;
+  jl_joint_real from[3];
+  for (int i = 0; i < dim; i++) from[i] = jl_load_joint(n, i);
+  track_dissipation = track_dissipation || yields || degrades;
+#define JL_STEP(name)                                                                       \
+  {                                                                                         \
+    if (tangent) jl_step_##name##_C(law, n, d, F, C, track_dissipation, curve_stored, all); \
+    else if (JL_BATCH && all)                                                               \
+      jl_step_##name##_measured(law, n, d, F, C, track_dissipation, curve_stored, all);     \
+    else jl_step_##name(law, n, d, F, C, track_dissipation, curve_stored, all);             \
   }
-  if (law->fades && (y || dim == 1 || (w && !JL_BATCH))) JL_STEP(rare_fades)
-  else if (y || dim == 1) JL_STEP(rare)
-  else if (JL_BATCH && dim == 2 && w) JL_STEP(plane_wears)
-  else if (dim == 2 && law->fades) JL_STEP(plane_fades)
+  if (law->interlock_decays && (yields || dim == 1 || (degrades && !JL_BATCH)))
+    JL_STEP(general_decaying)
+  else if (yields || dim == 1) JL_STEP(general)
+  else if (JL_BATCH && dim == 2 && degrades) JL_STEP(plane_degrading)
+  else if (dim == 2 && law->interlock_decays) JL_STEP(plane_decaying)
   else if (dim == 2) JL_STEP(plane)
-  else if (JL_BATCH && w) JL_STEP(space_wears)
-  else if (law->fades) JL_STEP(space_fades)
+  else if (JL_BATCH && degrades) JL_STEP(space_degrading)
+  else if (law->interlock_decays) JL_STEP(space_decaying)
   else JL_STEP(space)
 #undef JL_STEP
   if (!jl_element_rows(law)) return;
-  const jl_of_joint stored =
-      jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger);
-  if (all) jl_add_elements(law, n, stored, all);
+  const jl_joint_real stored =
+      jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, track_dissipation);
+  if (all) jl_add_element_measures(law, n, stored, all);
 }

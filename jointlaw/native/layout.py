@@ -1,8 +1,23 @@
-"""Layout of a law's tables in C, written once: here, from where `layout.h` is made.
+"""Memory layout of a law in C: the single declaration from which `layout.h` is generated.
 
-A new number of a law or of its facets gets a line below, and is there in C and in table files;
-`pack.py` gives it its value. By the standard library alone: the package is built by it, where
-numpy may be missing.
+A law reaches C as `struct jlaw_law`: integers, floats, and pointers to arrays. The same names are
+the keywords of a table file (`NAME.jlaw`), the fields of `LawStruct`, through which the compiled
+library reads a law from Python, and the offsets with which the page in a browser changes a number.
+A new number of a law needs one line below; `kernels/pack.py` fills it with the value that the
+elements of the law return by `numbers()`.
+
+The tables of facets are stored in blocks of four facets (`FACET_LANES`), which lie side by side:
+
+    facet   (blocks, columns, 4)        column c of facet i is facet[i // 4, c, i % 4]
+    depth   (blocks, cells, rows, 4)    row r of cell j of facet i is depth[i // 4, j, r, i % 4]
+
+A kernel that vectorises over the facets of one joint loads one column of four facets at once, and
+a kernel that vectorises over joints reads one number and broadcasts it. Both kernels read the same
+tables, so the exported header, the library, a graphics processor and the page in a browser share
+them. The last block is filled up with facets whose numbers are all zero; they carry no force.
+
+Only the standard library is imported here: the build of the package runs this module before numpy
+is installed.
 """
 
 import ctypes
@@ -15,137 +30,141 @@ from typing import NamedTuple
 from ..support import thresholds
 
 HERE = Path(__file__).parent
-FORMAT = 4  # of table files: a change of what follows changes it
-LANES = 4  # facets side by side in a block of the tables
-AZIMUTHS = 512  # of a ring of facets at most
-LARGEST = sys.float_info.max  # stands for infinity
+TABLE_FORMAT = 5  # version of the table files: increase it with every change of this layout
+FACET_LANES = 4  # facets that lie side by side in a block of the tables
+MAX_AZIMUTHS = 512  # facets of one inclination
+LARGEST_FLOAT = sys.float_info.max  # represents infinity, which table files cannot hold
 
 
-class Number(NamedTuple):
-    """A number of a law: its bounds, in C, and what it is."""
+class Field(NamedTuple):
+    """A number of a law: its bounds as expressions of C, and its meaning."""
 
-    least: str
-    most: str
-    about: str
+    lower: str
+    upper: str
+    meaning: str
 
 
-WHOLE = {
-    "dim": Number("1", "3", "components of a displacement"),
-    "facets": Number("0", "1e6", "M"),
-    "cells": Number("0", "1e6", "D, depth cells of a facet"),
-    "pieces": Number("0", "1e6", "of the virgin curve"),
-    "yields": Number("0", "1", "whether asperities yield"),
-    "fades": Number("0", "1", "whether slopes fade with the distance from mate"),
-    "wears": Number("0", "1", "whether slopes wear"),
-    "asperities": Number("0", "1", "whether there are asperities"),
-    "bonded": Number("0", "1", "whether there is a bond beside them"),
-    "coulomb": Number("0", "1", "whether it is Coulomb's joint"),
+INTEGERS = {
+    "dim": Field("1", "3", "components of a displacement"),
+    "facets": Field("0", "1e6", "M"),
+    "cells": Field("0", "1e6", "D, cells of a facet"),
+    "pieces": Field("0", "1e6", "of the first-loading curve"),
+    "yields": Field("0", "1", "whether asperities are elastic-perfectly plastic"),
+    "interlock_decays": Field("0", "1", "whether dilation decays with slip"),
+    "degrades": Field("0", "1", "whether asperities degrade under shear work"),
+    "asperities": Field("0", "1", "whether the joint has asperities"),
+    "bonded": Field("0", "1", "whether the joint has a cohesive bond"),
+    "coulomb": Field("0", "1", "whether the joint follows Coulomb's law"),
 }
-ELEMENTS = ("bonded", "coulomb")  # beside the asperities: functions of elements.h begin so
-NUMBERS = {
-    "soft": Number("0", "DBL_MAX", "1/lam"),
-    "mu": Number("0", "DBL_MAX", "friction of asperities"),
-    "mating_length": Number("0", "DBL_MAX", "m; infinite: the largest float"),
-    "slope_wear": Number("0", "DBL_MAX", "J/m2; infinite: the largest float"),
-    "slope_residual": Number("0", "1", "share of the slopes that never wears"),
-    "first_touch": Number("-DBL_MAX", "0", "m: closure at which an unmated joint touches"),
-    "eta": Number("0", "DBL_MAX", "exponent of the virgin curve"),
-    "scale": Number("0", "DBL_MAX", "V of the virgin curve, m^(1/2)"),
-    "rise": Number("0", "DBL_MAX", "p: the curve is tabulated over w^p"),
-    "bond_normal": Number("0", "DBL_MAX", "Pa/m: stiffness of the bond"),
-    "bond_shear": Number("0", "DBL_MAX", "Pa/m"),
-    "opening_begin": Number("0", "DBL_MAX", "1/m: one over the opening where it begins to break"),
-    "slip_begin": Number("0", "DBL_MAX", "1/m: the same of slip"),
-    "opening_end": Number("0", "DBL_MAX", "1/m: where nothing of it is left"),
-    "slip_end": Number("0", "DBL_MAX", "1/m"),
-    "coulomb_normal": Number("0", "DBL_MAX", "Pa/m: stiffness of Coulomb's joint"),
-    "coulomb_shear": Number("0", "DBL_MAX", "Pa/m"),
-    "coulomb_friction": Number("0", "DBL_MAX", "its friction"),
-    "coulomb_cohesion": Number("0", "DBL_MAX", "Pa"),
-    "coulomb_tension": Number("0", "DBL_MAX", "Pa"),
-    "coulomb_residual_friction": Number("0", "DBL_MAX", "once it has weakened"),
-    "coulomb_residual_cohesion": Number("0", "DBL_MAX", "Pa"),
-    "coulomb_weakening": Number("0", "DBL_MAX", "m of shear over which it weakens"),
-    "closure_factor": Number("0", "DBL_MAX", "normal stress over Phi"),
-    "stiffness_factor": Number("0", "DBL_MAX", "sum of A/c1: stiffness over Phi'"),
-    "bending_factor": Number("0", "DBL_MAX", "what slopes that fade add to it, over Phi"),
-    "joining_more": Number("0", "DBL_MAX", "what springs that join a cell add to it, over Phi'"),
-    "joining_most": Number("0", "DBL_MAX", "and at most"),
-    "largest_reach": Number("0", "DBL_MAX", "m: bound of |y|"),
-    "stretch": Number("1", "DBL_MAX", "bound of |y| over that of the displacement"),
-    "farthest": Number("0", "DBL_MAX", "m: largest closure that a stress is looked for in"),
+ELEMENTS = ("bonded", "coulomb")  # prefixes of their functions in elements.h
+REALS = {
+    "stiffness_ratio": Field("0", "DBL_MAX", "1/lam: shear over normal stiffness of an asperity"),
+    "mu": Field("0", "DBL_MAX", "friction coefficient of asperities"),
+    "mating_length": Field("0", "DBL_MAX", "m; infinite: the largest float"),
+    "slope_wear": Field("0", "DBL_MAX", "J/m2; infinite: the largest float"),
+    "slope_residual": Field("0", "1", "fraction of the slopes that never degrades"),
+    "first_touch_closure": Field("-DBL_MAX", "0", "m: closure at which an unmated joint touches"),
+    "eta": Field("0", "DBL_MAX", "exponent of the first-loading curve"),
+    "curve_scale": Field("0", "DBL_MAX", "V of the first-loading curve, m^(1/2)"),
+    "curve_exponent": Field("0", "DBL_MAX", "p: the curve is tabulated over w^p"),
+    "bond_normal_stiffness": Field("0", "DBL_MAX", "Pa/m"),
+    "bond_shear_stiffness": Field("0", "DBL_MAX", "Pa/m"),
+    "inverse_onset_opening": Field("0", "DBL_MAX", "1/m: 1/(opening at which damage begins)"),
+    "inverse_onset_slip": Field("0", "DBL_MAX", "1/m: 1/(slip at which damage begins)"),
+    "inverse_failure_opening": Field("0", "DBL_MAX", "1/m: 1/(opening at which the bond fails)"),
+    "inverse_failure_slip": Field("0", "DBL_MAX", "1/m: 1/(slip at which the bond fails)"),
+    "coulomb_normal_stiffness": Field("0", "DBL_MAX", "Pa/m"),
+    "coulomb_shear_stiffness": Field("0", "DBL_MAX", "Pa/m"),
+    "coulomb_friction": Field("0", "DBL_MAX", "friction coefficient"),
+    "coulomb_cohesion": Field("0", "DBL_MAX", "Pa"),
+    "coulomb_tension": Field("0", "DBL_MAX", "Pa: tensile strength"),
+    "coulomb_residual_friction": Field("0", "DBL_MAX", "friction coefficient after softening"),
+    "coulomb_residual_cohesion": Field("0", "DBL_MAX", "Pa, after softening"),
+    "coulomb_weakening_length": Field("0", "DBL_MAX", "m of slip over which the strength softens"),
+    "normal_stress_factor": Field("0", "DBL_MAX", "normal stress over Phi, unsheared"),
+    "stiffness_factor": Field("0", "DBL_MAX", "sum of A/c1: stiffness over Phi'"),
+    "curvature_stiffness_factor": Field(
+        "0", "DBL_MAX", "bound of the stiffness by the decay of slopes, over Phi"
+    ),
+    "engagement_stiffness_factor": Field(
+        "0", "DBL_MAX", "bound of the stiffness by springs that engage in a cell, over Phi'"
+    ),
+    "engagement_stiffness_limit": Field("0", "DBL_MAX", "upper limit of the same stiffness"),
+    "max_effective_closure": Field("0", "DBL_MAX", "m: bound of |y|"),
+    "closure_per_displacement": Field("1", "DBL_MAX", "bound of |y| over |displacement|"),
+    "max_search_closure": Field("0", "DBL_MAX", "m: upper end of the search for a closure"),
 }
-TABLES = {
-    "facet": "(blocks, JLAW_COLUMNS, JLAW_LANES), zeros beyond the last facet",
-    "depth": "(blocks, cells, JLAW_ROWS, JLAW_LANES)",
-    "curve": "(pieces, 4): S of the virgin curve",
-    "energy": "(pieces, 4): T",
+ARRAYS = {
+    "facet": "(blocks, JLAW_COLUMNS, JLAW_FACET_LANES), zeros beyond the last facet",
+    "depth": "(blocks, cells, JLAW_ROWS, JLAW_FACET_LANES)",
+    "curve": "(pieces, 4): S of the first-loading curve",
+    "energy": "(pieces, 4): T, of its integral",
 }
-COLUMNS = {  # of a facet: how many, and what
+FACET_COLUMNS = {  # of a facet: number of components, and meaning
     "M": (3, "m = n/c1: y = m . (closure, offset)"),
     "S": (3, "in-facet direction s"),
     "T": (3, "in-facet direction t"),
     "N": (3, "normal n"),
     "E": (2, "unit vector of the azimuth"),
-    "STEEP": (1, "tan(theta)"),
-    "COSINE": (1, "c1"),
-    "A": (1, "A"),
-    "STIFF": (1, "A/c1"),
-    "STRENGTH": (1, "mu lam A"),
-    "COMPLIANCE": (1, "c1/(2 A lam): from |q|^2/kappa to energy"),
-    "POTENTIAL": (1, "A c1"),
-    "SHARE": (1, "of all orientations"),
-    "YIELD": (1, "y_p = d_y/c1"),
-    "MIRROR": (1, "the facet mirrored along axis 2"),
-    "RING": (1, "facets of this inclination, one after the other"),
-    "LATE": (4, "unsheared joint: share, depth, share, depth of what yielding takes off"),
+    "TAN_THETA": (1, "tan(theta), theta: inclination"),
+    "COS_THETA": (1, "c1 = cos(theta)"),
+    "A": (1, "A, area factor"),
+    "SHEAR_STIFFNESS": (1, "A/c1"),
+    "FRICTION_LIMIT": (1, "mu lam A"),
+    "SLIDER_COMPLIANCE": (1, "c1/(2 A lam): energy over |q|^2/kappa"),
+    "ENERGY_FACTOR": (1, "A c1: energy over Psi"),
+    "WEIGHT": (1, "fraction of all orientations"),
+    "YIELD_CLOSURE": (1, "y_p = d_y/c1"),
+    "MIRROR": (1, "index of the facet mirrored along axis 2"),
+    "RING_SIZE": (1, "number of consecutive facets of this inclination"),
+    "YIELD_CORRECTION": (4, "unsheared joint: two pairs (factor, depth) that yielding subtracts"),
 }
-ROWS = {  # of a depth cell
-    "LOW": "zeta at its begin",
-    "FORCE": "Phi there",
-    "SLOPE": "Phi' there",
-    "HIGH": "zeta at its end",
-    "G": "G there",
-    "KAPPA": "kappa there",
+CELL_ROWS = {
+    "ZETA_START": "zeta at the start of the cell",
+    "PHI_START": "Phi at the start",
+    "DPHI_START": "Phi' at the start",
+    "ZETA_END": "zeta at the end",
+    "G_END": "G at the end",
+    "KAPPA_END": "kappa at the end",
 }
 
 
-class Law(ctypes.Structure):
+class LawStruct(ctypes.Structure):
     """`struct jlaw_law`."""
 
     _fields_ = [
-        *((name, ctypes.c_int) for name in WHOLE),
-        *((name, ctypes.c_double) for name in NUMBERS),
-        *((name, ctypes.c_void_p) for name in TABLES),
-        ("own", ctypes.c_void_p),
+        *((name, ctypes.c_int) for name in INTEGERS),
+        *((name, ctypes.c_double) for name in REALS),
+        *((name, ctypes.c_void_p) for name in ARRAYS),
+        ("memory", ctypes.c_void_p),
         ("fingerprint", ctypes.c_char * 80),
     ]
 
 
-def first_columns() -> dict[str, int]:
-    """Number of the first column of each name, and of all of them."""
-    ends = accumulate((count for count, _ in COLUMNS.values()), initial=0)
-    return dict(zip([*COLUMNS, "COLUMNS"], ends, strict=True))
+def column_offsets() -> dict[str, int]:
+    """Index of the first column of each name; "COLUMNS" is the number of columns."""
+    offsets = accumulate((count for count, _ in FACET_COLUMNS.values()), initial=0)
+    return dict(zip([*FACET_COLUMNS, "COLUMNS"], offsets, strict=True))
 
 
 def layout_h() -> str:
-    """The text of layout.h."""
-    columns = COLUMNS | {"COLUMNS": (0, "of a facet")}
-    keys = [
-        f"  X({name}, {int(numbers is WHOLE)}, {number.least}, {number.most})"
-        for numbers in (WHOLE, NUMBERS)
-        for name, number in numbers.items()
+    """Generate the text of layout.h."""
+    columns = FACET_COLUMNS | {"COLUMNS": (0, "of a facet")}
+    keywords = [
+        f"  X({name}, {int(fields is INTEGERS)}, {field.lower}, {field.upper})"
+        for fields in (INTEGERS, REALS)
+        for name, field in fields.items()
     ]
     lines = [
-        "/* Made from layout.py; change it there. */",
-        "#ifndef JLAW_FORMAT",
-        f"#define JLAW_FORMAT {FORMAT} /* of table files */",
+        "/* Generated from layout.py; change it there. */",
+        "#ifndef JLAW_TABLE_FORMAT",
+        f"#define JLAW_TABLE_FORMAT {TABLE_FORMAT} /* version of table files */",
         "enum {",
-        f"  JLAW_LANES = {LANES}, /* facets side by side in a block of the tables */",
-        f"  JLAW_AZIMUTHS = {AZIMUTHS}, /* most */",
-        *(f"  JLAW_{name} = {i}, /* {columns[name][1]} */" for name, i in first_columns().items()),
-        *(f"  JLAW_{name} = {i}, /* {about} */" for i, (name, about) in enumerate(ROWS.items())),
-        f"  JLAW_ROWS = {len(ROWS)} /* of a depth cell */",
+        f"  JLAW_FACET_LANES = {FACET_LANES}, /* facets side by side in a block of the tables */",
+        f"  JLAW_MAX_AZIMUTHS = {MAX_AZIMUTHS},",
+        *(f"  JLAW_{name} = {i}, /* {columns[name][1]} */" for name, i in column_offsets().items()),
+        *(f"  JLAW_{name} = {i}, /* {text} */" for i, (name, text) in enumerate(CELL_ROWS.items())),
+        f"  JLAW_ROWS = {len(CELL_ROWS)} /* of a cell */",
         "};",
         *(
             f"#define JLAW_{name} {value!r}"
@@ -153,35 +172,41 @@ def layout_h() -> str:
             if name.isupper()
         ),
         "struct jlaw_law {",
-        *(f"  int {name}; /* {number.about} */" for name, number in WHOLE.items()),
-        *(f"  double {name}; /* {number.about} */" for name, number in NUMBERS.items()),
-        *(f"  const double *{name}; /* {about} */" for name, about in TABLES.items()),
-        "  double *own; /* what jlaw_free frees */",
+        *(f"  int {name}; /* {field.meaning} */" for name, field in INTEGERS.items()),
+        *(f"  double {name}; /* {field.meaning} */" for name, field in REALS.items()),
+        *(f"  const double *{name}; /* {text} */" for name, text in ARRAYS.items()),
+        "  double *memory; /* of the arrays, freed by jlaw_free */",
         "  char fingerprint[80];",
         "};",
         f"#define JLAW_ELEMENTS(X) {' '.join(f'X({name})' for name in ELEMENTS)}",
-        "/* Each number of a table file: its name, 1 if it is whole, its bounds */",
-        "#define JLAW_NUMBERS(X) \\",
-        " \\\n".join(keys),
+        "/* Keywords of a table file: X(name, 1 for an integer, lower bound, upper bound) */",
+        "#define JLAW_KEYWORDS(X) \\",
+        " \\\n".join(keywords),
         "#endif\n",
     ]
     return "\n".join(lines)
 
 
 def jointlaw_h() -> str:
-    """The text of jointlaw.h: host.h with all that it includes, one file for a host.
+    """Generate the text of jointlaw.h: host.h with all that it includes, one file for a host.
 
-    many.h, the law for many joints side by side, is its text once more, under other names.
+    host.h includes the law twice: lanes.h, elements.h and law.h for one joint at a time, and
+    many.h for several joints in the lanes of a vector. many.h is generated here: it is the text of
+    the three files with other prefixes, so that both versions fit into one program.
     """
     texts = {path.name: path.read_text(encoding="utf-8") for path in HERE.glob("*.h")}
     texts["layout.h"] = layout_h()
 
-    def unfold(text: str) -> str:
+    def expand_includes(text: str) -> str:
         return re.sub(
-            r'^#include "(\w+\.h)"\n', lambda found: unfold(texts[found[1]]), text, flags=re.M
+            r'^#include "(\w+\.h)"\n',
+            lambda include: expand_includes(texts[include[1]]),
+            text,
+            flags=re.M,
         )
 
-    law = unfold(texts["lanes.h"] + texts["elements.h"] + texts["law.h"])
-    other = {"jl_": "jm_", "JL_": "JM_", "JLAW_ABREAST": "JM_ABREAST"}
-    texts["many.h"] = re.sub(r"\b(jl_|JL_|JLAW_ABREAST)", lambda found: other[found[1]], law)
-    return unfold(texts["host.h"])
+    law = expand_includes(texts["lanes.h"] + texts["elements.h"] + texts["law.h"])
+    renamed = {"jl_": "jm_", "JL_": "JM_", "JLAW_FACET_VECTORS": "JM_FACET_VECTORS"}
+    pattern = r"\b(jl_|JL_|JLAW_FACET_VECTORS)"
+    texts["many.h"] = re.sub(pattern, lambda prefix: renamed[prefix[1]], law)
+    return expand_includes(texts["host.h"])

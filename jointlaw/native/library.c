@@ -1,18 +1,18 @@
-/* library.c: calls the compiled texts of batch.c, one for each width of vectors. JLAW_LEVELS is the
- * sum of the lanes that this library was built for: 8 of 8 alone, 14 of 8, 4 and 2.
+/* library.c: selects the version of batch.c for the vectors of this processor. JLAW_LEVELS is the
+ * sum of the vector widths that this library was built for: 8 for 8 alone, 14 for 8, 4 and 2.
  */
 #include "batch.h"
 #include "export.h"
 
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 
-/* Advance, measure, refresh or stiffness (`what` = 0 to 3), by vectors of so many lanes */
-static jlaw_call *find(int lanes, int alone, int what)
+/* The function for `operation` (0 to 3: advance, measure, refresh, stiffness) and this width */
+static jlaw_call *find_call(int lanes, int contiguous, int operation)
 {
-#define LEVEL(W)                                                                 \
-  if (lanes == W) {                                                              \
-    extern jlaw_call *const jlaw_calls_##W[4], *const jlaw_calls_##W##_alone[4]; \
-    return (alone ? jlaw_calls_##W##_alone : jlaw_calls_##W)[what];              \
+#define LEVEL(W)                                                                      \
+  if (lanes == W) {                                                                   \
+    extern jlaw_call *const jlaw_calls_##W[4], *const jlaw_calls_##W##_contiguous[4]; \
+    return (contiguous ? jlaw_calls_##W##_contiguous : jlaw_calls_##W)[operation];    \
   }
 #if JLAW_LEVELS & 8
   LEVEL(8)
@@ -26,15 +26,16 @@ static jlaw_call *find(int lanes, int alone, int what)
   return NULL;
 }
 
-/* Call it for the joints of a batch that no other thread takes: every thread that calls takes the
- * next b->grain of them, whole blocks, until none are left */
-OUT int jlaw_run(jlaw_batch *b, int what)
+/* Run an operation on a batch. Several threads may call this for the same batch: each takes the
+ * next b->chunk joints (a multiple of JLAW_JOINTS_PER_BLOCK) until all are done. Returns 0, or -1
+ * if no memory is left. */
+OUT int jlaw_run(jlaw_batch *b, int operation)
 {
-  jlaw_call *const call = find(b->lanes, b->alone, what);
-  const long long n = b->n, grain = b->grain;
+  jlaw_call *const call = find_call(b->lanes, b->contiguous, operation);
+  const long long n = b->n, chunk = b->chunk;
   int failed = 0;
-  for (long long at; !failed && (at = __atomic_fetch_add(&b->taken, grain, __ATOMIC_RELAXED)) < n;)
-    failed = call(b, (long) at, (long) (n - at < grain ? n : at + grain));
+  for (long long at; !failed && (at = __atomic_fetch_add(&b->next, chunk, __ATOMIC_RELAXED)) < n;)
+    failed = call(b, (long) at, (long) (n - at < chunk ? n : at + chunk));
   return failed;
 }
 

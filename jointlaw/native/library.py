@@ -1,4 +1,4 @@
-"""The library of the compiled law: finds, loads and calls it."""
+"""Load the compiled library of the law and call it."""
 
 import ctypes
 from functools import lru_cache
@@ -7,62 +7,82 @@ from typing import Any
 
 from . import build
 
-ADVANCE, MEASURE, REFRESH, STIFFNESS = range(4)  # what jlaw_run calls
+ADVANCE, MEASURE, REFRESH, STIFFNESS = range(4)  # operations of jlaw_run
 
-
-ANEW = "build it anew with `python -m jointlaw.native`, or set JOINTLAW_KERNEL=numpy to do without"
+REBUILD_HINT = (
+    "rebuild it with `python -m jointlaw.native`, or set JOINTLAW_KERNEL=numpy to run without it"
+)
 
 
 class UnfitLibraryError(ImportError):
-    """The library was built from other sources than lie beside it, or for another processor."""
+    """The library was built from sources other than the installed ones or for another processor."""
 
 
 class BatchCall(ctypes.Structure):
     """`jlaw_batch` of batch.h."""
 
     _fields_ = [
-        *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "shown", "index")),
-        *((name, ctypes.c_longlong) for name in ("n", "taken", "grain")),
-        *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep")),
+        *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "measures", "index")),
+        *((name, ctypes.c_longlong) for name in ("n", "next", "chunk")),
+        *(
+            (name, ctypes.c_int)
+            for name in ("rows", "contiguous", "lanes", "track_dissipation", "commit")
+        ),
     ]
 
 
 @lru_cache(maxsize=1)
 def load() -> ctypes.CDLL | None:
-    """The library, None if there is none; raises UnfitLibraryError if it is not of this place."""
+    """Load the installed library.
+
+    Returns
+    -------
+    The library, or None if it was not built.
+
+    Raises
+    ------
+    UnfitLibraryError
+        If it does not fit the installed sources or this processor.
+    """
     path = build.BUILT / build.library_name(build.Compiler(()).machine[1])
     return load_file(path) if path.exists() else None
 
 
 def load_file(path: Path) -> ctypes.CDLL:
-    """The library of this file."""
+    """Load the library at this path; raises UnfitLibraryError as `load` does."""
     try:
         library = ctypes.CDLL(str(path))
     except OSError as error:
-        raise UnfitLibraryError(f"{path} cannot be loaded here ({error}): {ANEW}") from error
+        message = f"{path} cannot be loaded here ({error}): {REBUILD_HINT}"
+        raise UnfitLibraryError(message) from error
     library.jlaw_sources.restype = ctypes.c_char_p
     library.jlaw_run.argtypes = [ctypes.c_void_p, ctypes.c_int]
-    if library.jlaw_sources().decode() != build.sources():
-        raise UnfitLibraryError(f"{path} was built from other sources than lie beside it: {ANEW}")
-    if not lanes(library):
+    if library.jlaw_sources().decode() != build.hash_sources():
+        raise UnfitLibraryError(
+            f"{path} was built from sources other than the installed ones: {REBUILD_HINT}"
+        )
+    if not vector_lanes(library):
         raise UnfitLibraryError(
             f"{path} was built on another machine, for wider vectors than this processor has: "
-            f"{ANEW}; `JOINTLAW_LEVELS=all python -m jointlaw.native` builds for mixed machines"
+            f"{REBUILD_HINT}; `JOINTLAW_LEVELS=all python -m jointlaw.native` builds for mixed "
+            "machines"
         )
     return library
 
 
-def lanes(library: Any) -> int:
-    """Lanes of the widest vectors that the library and this processor have; 0 for none."""
-    here, built = library.jlaw_lanes(), library.jlaw_levels()
-    return max((n for n in build.LEVELS if n <= here and n & built), default=0)
+def vector_lanes(library: Any) -> int:
+    """Doubles in the widest vector that both library and processor support; 0 if there is none."""
+    of_processor = library.jlaw_lanes()
+    of_library = library.jlaw_levels()
+    supported = (n for n in build.LEVELS if n <= of_processor and n & of_library)
+    return max(supported, default=0)
 
 
 def address(array: Any) -> int | None:
-    """Where the numbers of a contiguous array begin; None for None."""
+    """Address of the first number of a contiguous array; None for None."""
     if array is None:
         return None
-    try:  # four times as fast as numpy's own
+    try:  # four times as fast as array.ctypes
         return ctypes.addressof(ctypes.c_char.from_buffer(array))
-    except (TypeError, ValueError):  # it is empty, or may only be read
+    except (TypeError, ValueError):  # an empty or read-only array
         return int(array.ctypes.data)

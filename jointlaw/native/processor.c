@@ -1,11 +1,11 @@
-/* processor.c: how wide the vectors of this processor are. Built for every processor. */
+/* processor.c: vector width of this processor. Compiled for the oldest processor of its kind. */
 #include "export.h"
 #if defined(__x86_64__)
 #include <cpuid.h>
 #endif
 
-/* Lanes of vectors that this processor and its system have, at most: 8, 4 or 2, for x86-64-v4, -v3
- * and all others. Read from cpuid: under zig __builtin_cpu_supports always says no. */
+/* Doubles in the widest vector of this processor and operating system: 8, 4 or 2, for x86-64-v4, -v3
+ * and all others. Read from cpuid, because __builtin_cpu_supports always returns 0 under zig. */
 OUT int jlaw_lanes(void)
 {
 #if defined(__x86_64__)
@@ -15,7 +15,7 @@ OUT int jlaw_lanes(void)
   unsigned a, b, c, d, saved;
   if (!__get_cpuid(0x80000001, &a, &b, &c, &d) || !(c & lzcnt)) return 2;
   if (!__get_cpuid(1, &a, &b, &c, &d) || (c & avx) != avx) return 2;
-  __asm__("xgetbv" : "=a"(saved), "=d"(d) : "c"(0)); /* registers that the system keeps */
+  __asm__("xgetbv" : "=a"(saved), "=d"(d) : "c"(0)); /* registers that the system saves */
   if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || (b & avx2) != avx2 || (saved & 6) != 6) return 2;
   return (b & avx512) == avx512 && (saved & 0xe6) == 0xe6 ? 8 : 4;
 #else

@@ -34,7 +34,13 @@ def library(folder, *flags, cc="cc", more=""):
     for function in ("normal_stress", "closure", "max_stiffness"):
         getattr(lib, f"jlaw_{function}").argtypes = [pointer, ctypes.c_double]
     lib.jlaw_rotate.argtypes = [pointer, pointer, ctypes.c_double]
-    for function in ("normal_stress", "closure", "max_stiffness", "stored", "dissipated"):
+    for function in (
+        "normal_stress",
+        "closure",
+        "max_stiffness",
+        "stored_energy",
+        "dissipated_energy",
+    ):
         getattr(lib, f"jlaw_{function}").restype = ctypes.c_double
     lib.jlaw_read.restype, lib.jlaw_fingerprint.restype = pointer, ctypes.c_char_p
     return lib
@@ -68,8 +74,11 @@ class CLaw:
     def measures(self):
         """sliding, slipping, separated; stored and dissipated energy."""
         shares, state = np.zeros(3), at(self.state)
-        self.lib.jlaw_shares(self.law, state, at(shares))
-        energies = (f(self.law, state) for f in (self.lib.jlaw_stored, self.lib.jlaw_dissipated))
+        self.lib.jlaw_contact_fractions(self.law, state, at(shares))
+        energies = (
+            f(self.law, state)
+            for f in (self.lib.jlaw_stored_energy, self.lib.jlaw_dissipated_energy)
+        )
         return [*shares, *energies]
 
 

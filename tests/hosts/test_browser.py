@@ -130,11 +130,11 @@ def test_tables_made_in_the_page_are_those_of_python(chromium, preset):
         law, orientation=replace(law.orientation, a=2.3, c=c),
         asperity=replace(law.asperity, mu=0.5), mating_length=length,
     )  # fmt: skip
-    ours, begin = export.tables(law), export.Struct.facet.offset
+    ours, begin = export.tables(law), export.LawStruct.facet.offset
     made, wanted = (np.frombuffer(one[begin:]) for one in (bytes(bytes_), ours))
-    np.testing.assert_allclose(made, wanted, rtol=1e-11, atol=1e-13)  # m: nodes of the virgin curve
-    for name in ("mu", "mating_length", "closure_factor", "stretch"):
-        at = getattr(export.Struct, name).offset
+    np.testing.assert_allclose(made, wanted, rtol=1e-11, atol=1e-13)  # m: nodes of the curve
+    for name in ("mu", "mating_length", "normal_stress_factor", "closure_per_displacement"):
+        at = getattr(export.LawStruct, name).offset
         assert np.frombuffer(bytes(bytes_)[at : at + 8]) == pytest.approx(
             np.frombuffer(ours[at : at + 8]), rel=1e-11
         )

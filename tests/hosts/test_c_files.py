@@ -15,9 +15,9 @@ from programs import found, output
 
 import jointlaw as jl
 from jointlaw.cli.main import main
-from jointlaw.hosts.c.export import FORMAT, _sum, header_text, table_text
+from jointlaw.hosts.c.export import _sum, header_text, table_text
 from jointlaw.native.build import BUILT
-from jointlaw.native.layout import jointlaw_h
+from jointlaw.native.layout import TABLE_FORMAT, jointlaw_h
 
 FUZZ = HERE / "fuzz.c"
 DOCS = Path(__file__).parents[2] / "docs"
@@ -31,7 +31,7 @@ COPIED = {
     "native.md": re.search(r"^```c\n(.*?)^```", PAGE, re.M | re.S)[1],
     "jointlaw.h": "\n".join(re.findall(r"^ \*     (.*)", jointlaw_h().partition("*/")[0], re.M)),
 }
-BARE = ["-DJOINTLAW_PLAIN", "-DJOINTLAW_NO_LEDGER"]
+BARE = ["-DJOINTLAW_SCALAR", "-DJOINTLAW_NO_DISSIPATION"]
 NO_NAME = "is no identifier of C; take letters"
 DEVICE = """
 #define __CUDACC_RTC__
@@ -56,7 +56,7 @@ def law():
 
 @pytest.fixture(scope="module")
 def lib(tmp_path_factory):
-    return library(tmp_path_factory.mktemp("c"), "-O0", "-DJOINTLAW_PLAIN")
+    return library(tmp_path_factory.mktemp("c"), "-O0", "-DJOINTLAW_SCALAR")
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_damaged_and_hostile_files(fuzz, tmp_path, law):
 
 
 def test_two_threads_on_one_law(tmp_path, law):
-    program = build(tmp_path, FUZZ, *SANE, "-DJOINTLAW_PLAIN", "-fsanitize=thread", "-lpthread")
+    program = build(tmp_path, FUZZ, *SANE, "-DJOINTLAW_SCALAR", "-fsanitize=thread", "-lpthread")
     (tmp_path / "x.jlaw").write_text(table_text(law))
     assert "the same states" in output(program, "threads", tmp_path / "x.jlaw")
 
@@ -139,7 +139,7 @@ def resigned(text):
 BAD = {
     "empty": (lambda text: "", "it is no table file of jointlaw"),
     "version": (
-        lambda text: text.replace(f"tables {FORMAT}", "tables 2", 1),
+        lambda text: text.replace(f"tables {TABLE_FORMAT}", "tables 2", 1),
         "of another version than this jointlaw.h; export law and header anew",
     ),
     "cut": (lambda text: text[: len(text) // 2], "it ends too early: copy it again, whole"),
@@ -148,7 +148,7 @@ BAD = {
         "it is damaged: its sum is wrong",
     ),
     "unknown keyword": (
-        lambda text: resigned(text.replace("\nrise ", "\nfall ", 1)),
+        lambda text: resigned(text.replace("\ncurve_exponent ", "\nfall ", 1)),
         "a keyword is missing, unknown or not in its place",
     ),
     "huge": (
@@ -241,7 +241,7 @@ def test_no_other_page_shows_a_text_in_c():
 @pytest.mark.parametrize("plane", ["plane = 0.0", "closure_only = true"])
 def test_examples_of_fewer_components(tmp_path, law, plane):
     jl.export_c(jl.JointLaw.from_text(f"{plane}\n{law.to_toml()}"), tmp_path, "flat")
-    flags = [*STRICT, "-O0", "-DJOINTLAW_PLAIN"]
+    flags = [*STRICT, "-O0", "-DJOINTLAW_SCALAR"]
     law_o = build(tmp_path, SOURCE, *flags, "-std=c99", "-c", name="jointlaw.o")
     flags.append(str(law_o))
     example = build(tmp_path, tmp_path / "example.c", *flags, "-std=c99", name="e")

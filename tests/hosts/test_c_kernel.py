@@ -16,7 +16,7 @@ from jointlaw.hosts.c.export import header_text
 
 BUILDS = {  # test_native.py tells the same of the library, which is made of the same text
     "gcc": ("gcc", [*FAST, "-std=c99"]),
-    "gcc -O0, no vectors": ("gcc", ["-O0", "-ffp-contract=off", "-DJOINTLAW_PLAIN"]),
+    "gcc -O0, no vectors": ("gcc", ["-O0", "-ffp-contract=off", "-DJOINTLAW_SCALAR"]),
     "gcc, this machine": ("gcc", [*FAST, "-std=c99", "-march=native", "-DJOINTLAW_MANY"]),
     "clang, this machine": ("clang", [*FAST, "-march=native", "-DJOINTLAW_MANY"]),
     "C++": ("g++", [*FAST, "-std=c++17", "-march=x86-64-v3", "-DJOINTLAW_MANY"]),
@@ -56,7 +56,7 @@ def lib(tmp_path_factory):
     for i, law in enumerate(DECLARED):
         (folder / f"law_{i}.h").write_text(header_text(law, f"law_{i}"))
     more = "".join(map(CONSTANTS.format, range(len(DECLARED))))
-    flags = "-O1", "-DJOINTLAW_PLAIN", "-ffp-contract=off", f"-I{folder}"
+    flags = "-O1", "-DJOINTLAW_SCALAR", "-ffp-contract=off", f"-I{folder}"
     return library(folder, *flags, more=more)
 
 
@@ -107,7 +107,7 @@ def test_both_forms_of_the_tables_give_what_python_gives(lib, tmp_path, i):
         apart = law.joint()
         with contextlib.suppress(ValueError):  # of a law whose faces always fit
             apart = law.joint(mated=False)
-        assert lib.jlaw_unmated(one.law, at(one.state)) == (0 if apart.delta.any() else -1)
+        assert lib.jlaw_init_unmated(one.law, at(one.state)) == (0 if apart.delta.any() else -1)
         np.testing.assert_array_equal(one.state, apart.snapshot().values[0])
 
 
@@ -169,7 +169,9 @@ def in_sliders(joint, end):
     """Energy stored in the shear springs, whose forces are the rows from 4 to `end`."""
     without = joint.state.copy()
     without[4:end] = 0.0
-    return np.subtract(*(joint.lib.jlaw_stored(joint.law, at(s)) for s in (joint.state, without)))
+    return np.subtract(
+        *(joint.lib.jlaw_stored_energy(joint.law, at(s)) for s in (joint.state, without))
+    )
 
 
 @pytest.mark.parametrize("damage", [{}, {"yield_interference": 1e-7}])

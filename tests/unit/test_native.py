@@ -263,8 +263,8 @@ OWN = build.BUILT / build.library_name(build.Compiler(()).machine[1])
 @pytest.mark.parametrize(
     ("module", "name", "value", "told"),
     [
-        (build, "sources", "0" * 16, r"python -m jointlaw\.native"),
-        (library, "lanes", 0, "`JOINTLAW_LEVELS=all python -m joint"),
+        (build, "hash_sources", "0" * 16, r"python -m jointlaw\.native"),
+        (library, "vector_lanes", 0, "`JOINTLAW_LEVELS=all python -m joint"),
     ],
 )
 def test_a_library_of_other_sources_or_vectors_is_refused(monkeypatch, module, name, value, told):
@@ -278,13 +278,13 @@ def test_a_library_serves_the_processors_that_have_its_vectors():
     taken = {(8, 14): 8, (8, 4): 4, (4, 14): 4, (2, 14): 2, (2, 2): 2, (4, 8): 0, (2, 12): 0}
     for (here, built), lanes in taken.items():
         loaded = SimpleNamespace(jlaw_lanes=lambda n=here: n, jlaw_levels=lambda n=built: n)
-        assert library.lanes(loaded) == lanes
-    assert library.lanes(library.load_file(OWN)) == library.load().jlaw_lanes()
+        assert library.vector_lanes(loaded) == lanes
+    assert library.vector_lanes(library.load_file(OWN)) == library.load().jlaw_lanes()
 
 
 def test_a_file_that_is_no_library_of_this_machine_is_refused(tmp_path):
     (tmp_path / "libjointlaw.so").write_bytes(b"\x7fELF of another machine")
-    with pytest.raises(library.UnfitLibraryError, match=r"cannot be loaded here .*build it anew"):
+    with pytest.raises(library.UnfitLibraryError, match=r"cannot be loaded here .*rebuild it"):
         library.load_file(tmp_path / "libjointlaw.so")
 
 
@@ -292,15 +292,15 @@ def test_what_is_built_for_this_machine_and_for_others(monkeypatch):
     """One width of vectors for this machine; all for others, and where all are asked for."""
     monkeypatch.delenv("JOINTLAW_LEVELS", raising=False)
     compiler = build.find_compiler()
-    assert build.chosen_levels(compiler) == (library.load().jlaw_lanes(),)
-    assert build.chosen_levels(build.zig("x86_64-windows-gnu")) == tuple(build.LEVELS)
-    assert build.chosen_levels(build.zig("aarch64-windows-gnu")) == (2,)
+    assert build.select_levels(compiler) == (library.load().jlaw_lanes(),)
+    assert build.select_levels(build.zig("x86_64-windows-gnu")) == tuple(build.LEVELS)
+    assert build.select_levels(build.zig("aarch64-windows-gnu")) == (2,)
     monkeypatch.setenv("JOINTLAW_LEVELS", "all")
     alike = compiler.machine[0] == "x86_64"
-    assert build.chosen_levels(compiler) == (tuple(build.LEVELS) if alike else (2,))
+    assert build.select_levels(compiler) == (tuple(build.LEVELS) if alike else (2,))
     monkeypatch.setenv("JOINTLAW_LEVELS", "both")
-    with pytest.raises(ValueError, match="JOINTLAW_LEVELS = 'both' is unknown; write all"):
-        build.chosen_levels(compiler)
+    with pytest.raises(ValueError, match="JOINTLAW_LEVELS = 'both' is unknown; set it to all"):
+        build.select_levels(compiler)
 
 
 def test_without_a_library_numpy_remains_and_that_is_said_once(engines_anew, monkeypatch, recwarn):
@@ -321,5 +321,5 @@ def test_a_compiler_that_is_there_may_be_a_stub(monkeypatch, tmp_path):
         (tmp_path / name).write_text("#!/bin/sh\nexit 0\n")  # makes nothing, and says it did
         (tmp_path / name).chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert len(build.installed()) == 4
-    assert not any(map(build.works, build.installed()))
+    assert len(build.compilers_on_path()) == 4
+    assert not any(map(build.works, build.compilers_on_path()))

@@ -6,8 +6,15 @@ from pathlib import Path
 
 from ... import presets
 from ...laws.law import Law
-from ...native.layout import ELEMENTS, LANES, NUMBERS, ROWS, WHOLE, first_columns
-from ...native.layout import Law as Struct
+from ...native.layout import (
+    CELL_ROWS,
+    ELEMENTS,
+    FACET_LANES,
+    INTEGERS,
+    REALS,
+    LawStruct,
+    column_offsets,
+)
 from ...support.files import write_files
 from ..c.export import packed
 
@@ -45,11 +52,11 @@ def export_browser(directory: str | Path) -> Path:
 def script() -> str:
     """The script of that page: tables of the presets, the law, and what draws it."""
     about = {
-        "numbers": {name: getattr(Struct, name).offset for name in (*WHOLE, *NUMBERS)},
-        "begin": Struct.facet.offset,
-        "columns": first_columns(),
-        "rows": list(ROWS),
-        "lanes": LANES,
+        "numbers": {name: getattr(LawStruct, name).offset for name in (*INTEGERS, *REALS)},
+        "begin": LawStruct.facet.offset,
+        "columns": column_offsets(),
+        "rows": list(CELL_ROWS),
+        "lanes": FACET_LANES,
         "wasm": _text((HERE / WASM).read_bytes()),
     }
     rocks = {}
@@ -72,9 +79,11 @@ def tables(law: Law) -> bytes:
     Raises ValueError for a law that joint.c does not run.
     """
     numbers, arrays = packed(law)
-    if numbers["dim"] != 3 or any(numbers[name] for name in ("yields", "wears", "rise", *ELEMENTS)):
+    if numbers["dim"] != 3 or any(
+        numbers[name] for name in ("yields", "degrades", "curve_exponent", *ELEMENTS)
+    ):
         raise ValueError("joint.c runs elastic laws in space, of asperities alone")
-    head = bytes(Struct(**numbers))[: Struct.facet.offset]
+    head = bytes(LawStruct(**numbers))[: LawStruct.facet.offset]
     return b"".join([head, *(array.tobytes() for array in arrays.values())])
 
 

@@ -2,7 +2,7 @@
  * as everywhere, one lane wide, which gives the same bits. After a change here or in the law's own
  * files: `python builder/wasm.py` makes joint.wasm anew. */
 #define JOINTLAW_IMPLEMENTATION
-#define JOINTLAW_PLAIN
+#define JOINTLAW_SCALAR
 #define JOINTLAW_NO_FILES
 #include "jointlaw.h"
 
@@ -19,10 +19,10 @@ OUT(take_law) const double *take_law(void)
 {
   const size_t head = offsetof(jlaw_law, facet);
   memcpy(&law, bytes(), head);
-  const size_t blocks = (size_t) (law.facets + JLAW_LANES - 1) / JLAW_LANES;
+  const size_t blocks = (size_t) (law.facets + JLAW_FACET_LANES - 1) / JLAW_FACET_LANES;
   law.facet = (const double *) (bytes() + head);
-  law.depth = law.facet + blocks * JLAW_COLUMNS * JLAW_LANES;
-  law.curve = law.depth + blocks * (size_t) law.cells * JLAW_ROWS * JLAW_LANES;
+  law.depth = law.facet + blocks * JLAW_COLUMNS * JLAW_FACET_LANES;
+  law.curve = law.depth + blocks * (size_t) law.cells * JLAW_ROWS * JLAW_FACET_LANES;
   law.energy = law.curve + 4 * law.pieces;
   return law.energy + 4 * law.pieces;
 }
@@ -30,20 +30,20 @@ OUT(take_law) const double *take_law(void)
 OUT(state_size) int state_size(void) { return jlaw_state_size(&law); }
 OUT(facet_count) int facet_count(void) { return law.facets; }
 OUT(cell_count) int cell_count(void) { return law.cells; }
-OUT(stored) double stored(const double *s) { return jlaw_stored(&law, s); }
-OUT(dissipated) double dissipated(const double *s) { return jlaw_dissipated(&law, s); }
+OUT(stored) double stored(const double *s) { return jlaw_stored_energy(&law, s); }
+OUT(dissipated) double dissipated(const double *s) { return jlaw_dissipated_energy(&law, s); }
 OUT(closure_at) double closure_at(double stress) { return jlaw_closure(&law, stress); }
 
 /* One step from s0 to s1 as jlaw_update, of elastic asperities in space, whose slopes may fade: F (3)
  * and C (3, 3); 0, or -1 and a message. Other kinds of law would make the file larger. */
 OUT(update) int update(const double *s0, double *s1, const double *d, double *F, char *message)
 {
-  const jl_numbers n = {s1, 1, 0};
+  const jl_states n = {s1, 1, 0};
   int damaged;
-  if (!jlaw_allowed_(&law, s0, d, &damaged))
-    return jlaw_refuse_(&law, s0, d, damaged, message, JLAW_MESSAGE);
+  if (!jlaw_step_is_valid_(&law, s0, d, &damaged))
+    return jlaw_report_invalid_(&law, s0, d, damaged, message, JLAW_MESSAGE);
   memcpy(s1, s0, (size_t) jl_state_rows(&law) * sizeof *s1);
-  if (law.fades) jl_step_space_fades_C(&law, n, d, F, F + 3, 1, 0, NULL);
+  if (law.interlock_decays) jl_step_space_decaying_C(&law, n, d, F, F + 3, 1, 0, NULL);
   else jl_step_space_C(&law, n, d, F, F + 3, 1, 0, NULL);
   return 0;
 }
@@ -53,28 +53,26 @@ OUT(update) int update(const double *s0, double *s1, const double *d, double *F,
  * begins, and its shear force over its friction limit */
 OUT(look) void look(double *s, double *to)
 {
-  const jl_numbers n = {s, 1, 0};
+  const jl_states n = {s, 1, 0};
   const int M = law.facets, D = law.cells;
   for (int at = 0; at < M; at++) {
-    const double *f = jl_facet_of(&law, at), *cell = jl_cell_of(&law, at);
+    const double *f = jl_facet_table(&law, at), *cell = jl_cell_table(&law, at);
     double held = 0.0, *row = to + at * (5 + 2 * D);
-    jl_facets o;
-    jl_facets_now(&law, n, at, &o);
-    const double force = o.y1 > o.z1 ? jl_larger(o.f1 - o.fz1, 0.0) : 0.0;
+    jl_facet_step o;
+    jl_evaluate_facets(&law, n, at, &o);
+    const double force = o.y1 > o.z1 ? jl_max(o.f1 - o.fz1, 0.0) : 0.0;
     for (int i = 0; i < 3; i++) row[i] = jl_column(f, JLAW_N + i);
-    for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
+    for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_FACET_LANES) {
       double G, kappa;
       const int of = jl_slider_row(&law) + at * D + i;
-      jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law.yields, &G, &kappa);
-      const double q = jl_root(s[of] * s[of] + s[of + M * D] * s[of + M * D]);
-      const double limit = o.strength
-                           * (G * (1.0 - JLAW_FRICTION_TOLERANCE)
-                              - JLAW_ROUNDING_TOLERANCE * o.f1);
+      jl_evaluate_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law.yields, &G, &kappa);
+      const double q = jl_sqrt(s[of] * s[of] + s[of + M * D] * s[of + M * D]);
+      const double limit = o.strength * (G * (1.0 - JLAW_FRICTION_TOLERANCE) - JLAW_ROUNDING_TOLERANCE * o.f1);
       if (G > 0.0 && q >= limit) held += G;
-      row[5 + 2 * i] = jl_column(f, JLAW_COSINE) * (jl_column(cell, JLAW_LOW) - o.y1);
+      row[5 + 2 * i] = jl_column(f, JLAW_COS_THETA) * (jl_column(cell, JLAW_ZETA_START) - o.y1);
       row[6 + 2 * i] = G > 0.0 ? (q >= limit ? 1.0 : q / (o.strength * G)) : 0.0;
     }
     row[3] = jl_column(f, JLAW_A) * force;
-    row[4] = force > 0.0 ? jl_smaller(held / force, 1.0) : 0.0;
+    row[4] = force > 0.0 ? jl_min(held / force, 1.0) : 0.0;
   }
 }

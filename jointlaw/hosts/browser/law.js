@@ -43,7 +43,7 @@ class Tables {
 
   /* Phi, Phi' and Phi'' of the virgin curve at y > 0: cubic pieces of S over t */
   curve(y) {
-    const eta = this.number("eta"), v = Math.sqrt(y), V = this.number("scale");
+    const eta = this.number("eta"), v = Math.sqrt(y), V = this.number("curve_scale");
     const t = v / (v + V), s = V / (v + V), n = this.pieces;
     const at = Math.min(Math.floor(t * n), n - 1), x = t * n - at;
     const c = [0, 1, 2, 3].map((i) => this.get(this.curveBegin + 8 * (4 * at + i)));
@@ -65,9 +65,9 @@ function tablesOf(rock, { a, c, mu, mating }) {
   for (let i = 0; i < M; i++) {
     const get = (name, more) => tables.get(tables.place(i, name, more));
     const theta = Math.acos(Math.min(1, get("N"))), phi = Math.atan2(get("E", 1), get("E"));
-    old.push({ u: Math.cos(own.a * theta), phi, c1: get("COSINE"), share: get("SHARE"), A: get("A") });
+    old.push({ u: Math.cos(own.a * theta), phi, c1: get("COS_THETA"), share: get("WEIGHT"), A: get("A") });
   }
-  const eta = tables.number("eta"), soft = tables.number("soft"), shares = ringShares(tables, old);
+  const eta = tables.number("eta"), soft = tables.number("stiffness_ratio"), shares = ringShares(tables, old);
   const whole = old.findIndex((f) => f.share > 0);
   const unit = old[whole].A / (old[whole].share * old[whole].c1 ** (1 + eta)); // N lam K
   const facets = old.map(({ u, phi }, i) => {
@@ -80,10 +80,10 @@ function tablesOf(rock, { a, c, mu, mating }) {
   if (tables.cells > 1) setCells(tables, rock.range, facets);
   tables.setNumber("mu", mu);
   tables.setNumber("mating_length", Math.min(mating, Number.MAX_VALUE));
-  tables.view.setInt32(JOINTLAW.numbers.fades, mating < Infinity ? 1 : 0, true);
+  tables.view.setInt32(JOINTLAW.numbers.interlock_decays, mating < Infinity ? 1 : 0, true);
   const carried = ({ A, theta, steep }) => A * (Math.cos(theta) + Math.sin(theta) * Math.min(steep * soft, mu));
-  tables.setNumber("closure_factor", facets.reduce((sum, f) => sum + carried(f), 0));
-  tables.setNumber("stretch", 1 + 2 * Math.max(1, ...facets.map((f) => f.steep)));
+  tables.setNumber("normal_stress_factor", facets.reduce((sum, f) => sum + carried(f), 0));
+  tables.setNumber("closure_per_displacement", 1 + 2 * Math.max(1, ...facets.map((f) => f.steep)));
   return tables.bytes;
 }
 
@@ -91,7 +91,7 @@ function tablesOf(rock, { a, c, mu, mating }) {
 function ringShares(tables, facets) {
   return facets.map((f, i) => {
     const ring = facets.filter((other) => Math.abs(other.u - f.u) < 1e-9);
-    return ring.reduce((sum, other) => sum + other.share, 0) / tables.get(tables.place(i, "RING"));
+    return ring.reduce((sum, other) => sum + other.share, 0) / tables.get(tables.place(i, "RING_SIZE"));
   });
 }
 
@@ -101,14 +101,14 @@ function setFacet(tables, i, { theta, phi, share, c1, steep, A }, mu, soft) {
   set("M", 1, (st * cp) / c1, (st * sp) / c1);
   set("S", -st, c1 * cp, c1 * sp);
   set("N", c1, st * cp, st * sp);
-  set("STEEP", steep);
-  set("COSINE", c1);
+  set("TAN_THETA", steep);
+  set("COS_THETA", c1);
   set("A", A);
-  set("STIFF", A / c1);
-  set("STRENGTH", (mu / soft) * A);
-  set("COMPLIANCE", A > 0 ? (c1 * soft) / (2 * A) : 0);
-  set("POTENTIAL", A * c1);
-  set("SHARE", share);
+  set("SHEAR_STIFFNESS", A / c1);
+  set("FRICTION_LIMIT", (mu / soft) * A);
+  set("SLIDER_COMPLIANCE", A > 0 ? (c1 * soft) / (2 * A) : 0);
+  set("ENERGY_FACTOR", A * c1);
+  set("WEIGHT", share);
 }
 
 const GRID = 512;
@@ -123,7 +123,7 @@ function interpolated(x, xs, ys) {
 
 /* Limits of the depth cells of all facets, and what the law keeps of them */
 function setCells(tables, range, facets) {
-  const low = (i, j) => tables.get(tables.cellPlace(i, j, "LOW"));
+  const low = (i, j) => tables.get(tables.cellPlace(i, j, "ZETA_START"));
   const counts = facets.map((_, i) => Array.from({ length: tables.cells }, (_, j) => low(i, j)).filter((z) => z < OPEN_ENDED).length);
   const far = Math.max(1, Math.min(2, Math.max(...counts) / 8)); // many cells reach farther
   const reach = facets.map((f) => range * (1 + far * Math.min(f.steep, 10)));
@@ -143,10 +143,10 @@ function setCells(tables, range, facets) {
     const at = begins.map((z) => (z ? tables.curve(z) : [0, 0]));
     begins.forEach((z, j) => {
       const put = (name, value) => tables.set(tables.cellPlace(i, j, name), value);
-      put("LOW", z), put("FORCE", at[j][0]), put("SLOPE", at[j][1]);
+      put("ZETA_START", z), put("PHI_START", at[j][0]), put("DPHI_START", at[j][1]);
       if (j === counts[i] - 1) return; // the last has no end
       const next = begins[j + 1], [phi, slope] = at[j + 1];
-      put("HIGH", next), put("G", phi - at[j][0] - at[j][1] * (next - z)), put("KAPPA", slope - at[j][1]);
+      put("ZETA_END", next), put("G_END", phi - at[j][0] - at[j][1] * (next - z)), put("KAPPA_END", slope - at[j][1]);
     });
   });
 }

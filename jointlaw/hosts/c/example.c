@@ -51,10 +51,10 @@ int main(int count, char **words)
   for (int i = 1; !wrong && i <= (dim > 1 ? 2 * steps : 1); i++) {
     const double shear = i <= steps ? end / steps : -end / steps;
     if (dim > 1) wrong = step_at_stress(law, state, next, stress, shear, F);
-    jlaw_shares(law, state, shares);
+    jlaw_contact_fractions(law, state, shares);
     if (!wrong)
       printf("%.3f,%.4f,%.4f,%.4f,%.4f,%.4f\n", dim > 1 ? 1e6 * state[1] : 0.0, 1e6 * state[0],
-             1e-6 * F[0], dim > 1 ? 1e-6 * F[1] : 0.0, shares[0], jlaw_dissipated(law, state));
+             1e-6 * F[0], dim > 1 ? 1e-6 * F[1] : 0.0, shares[0], jlaw_dissipated_energy(law, state));
   }
   free(next);
   free(state);

@@ -18,7 +18,7 @@ int main()
   const double inertia = 0.4 * mass * radius * radius;
   const double area = 1e-4; // m2 of joint that a contact stands for: its forces are area times F
   // the closure that a fall of 2 mm can reach bounds the stiffness, and so the time step
-  double deepest = law->largest_reach;
+  double deepest = law->max_effective_closure;
   for (double y = 1e-9; y < deepest; y *= 1.1)
     if (0.5 * area * jlaw_normal_stress(law, y) * y > 10.0 * mass * gravity * 2e-3) deepest = y;
   const double dt = 0.1 * 2.0 * std::sqrt(mass / (area * jlaw_max_stiffness(law, deepest)));
@@ -56,7 +56,7 @@ int main()
           torque -= area * F[1] * radius;
         }
         if (closure < -1e-5) { // far apart: its asperities are met by others next time
-          lost += area * jlaw_dissipated(law, state.data());
+          lost += area * jlaw_dissipated_energy(law, state.data());
           contacts.erase(found);
           ended++;
         }
@@ -72,6 +72,6 @@ int main()
   for (std::size_t i = 0; i < spheres.size(); i++)
     std::printf("%zu,%.6f,%.3f,%.6f,%.6f\n", i, spheres[i].x, 1e6 * (spheres[i].z - radius),
                 spheres[i].vx, spheres[i].spin);
-  for (auto &contact : contacts) lost += area * jlaw_dissipated(law, contact.second.data());
+  for (auto &contact : contacts) lost += area * jlaw_dissipated_energy(law, contact.second.data());
   std::printf("contacts begun %d, ended %d, energy lost to friction %.3e J\n", begun, ended, lost);
 }

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ...kernels.pack import pack, rings
 from ...laws.law import Law
-from ...native.layout import AZIMUTHS, FORMAT, jointlaw_h
+from ...native.layout import MAX_AZIMUTHS, TABLE_FORMAT, jointlaw_h
 from ...support.checks import Array
 from ...support.files import write_files
 
@@ -82,7 +82,7 @@ def table_text(law: Law) -> str:
     The last line holds a sum (FNV-1a) of the bytes before it, by which damage is told.
     """
     numbers, arrays = packed(law)
-    lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
+    lines = [f"jointlaw tables {TABLE_FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in law.to_toml().splitlines()]
     lines += [f"{key} {x if isinstance(x, int) else _exact(x)}" for key, x in numbers.items()]
     for key, array in arrays.items():
@@ -100,8 +100,9 @@ def header_text(law: Law, name: str) -> str:
     parts = [
         f"/* {name}: tables of a joint law, made by `jointlaw export c`.\n{about}\n */",
         f'#ifndef {guard}\n#define {guard}\n#include "jointlaw.h"\n'
-        f"#if JLAW_FORMAT != {FORMAT}\n"
-        f'#error "{name}.h is of format {FORMAT}, jointlaw.h of another: export both anew"\n#endif',
+        f"#if JLAW_TABLE_FORMAT != {TABLE_FORMAT}\n"
+        f'#error "{name}.h has format {TABLE_FORMAT}, jointlaw.h another one: export both again"\n'
+        "#endif",
     ]
     for key, array in arrays.items():
         rows = ",\n".join(", ".join(map(repr, row.tolist())) for row in array.reshape(-1, 4))
@@ -118,10 +119,10 @@ def header_text(law: Law, name: str) -> str:
 def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` by name, in its order; refuses too many azimuths."""
     facets = law.tables.asperities
-    if facets is not None and (most := rings(facets.theta).max()) > AZIMUTHS:
+    if facets is not None and (most := rings(facets.theta).max()) > MAX_AZIMUTHS:
         raise ValueError(
             f"resolution.phi gives {most:g} azimuths on the circle: jointlaw.h takes at most "
-            f"{AZIMUTHS}; lower it"
+            f"{MAX_AZIMUTHS}; lower it"
         )
     return pack(law.tables)
 

@@ -85,9 +85,9 @@ static int steps(const jlaw_law *law, double size, long count)
     }
     if (to != s) memcpy(s, next, bytes);
     if (!finite_all(s, rows) || !finite_all(F, dim)) return wrong("not finite", k);
-    if (jlaw_dissipated(law, s) < jlaw_dissipated(law, kept)) return wrong("friction made energy", k);
-    if (!(jlaw_stored(law, s) >= 0.0) || jlaw_stored(law, s) > DBL_MAX) return wrong("stored", k);
-    jlaw_shares(law, s, shares);
+    if (jlaw_dissipated_energy(law, s) < jlaw_dissipated_energy(law, kept)) return wrong("friction made energy", k);
+    if (!(jlaw_stored_energy(law, s) >= 0.0) || jlaw_stored_energy(law, s) > DBL_MAX) return wrong("stored", k);
+    jlaw_contact_fractions(law, s, shares);
     for (int i = 0; i < 3; i++)
       if (!(shares[i] >= 0.0 && shares[i] <= 1.0 + 1e-12)) return wrong("shares", k);
     if (pick(50) == 0) jlaw_swap_bodies(law, s);
@@ -119,16 +119,16 @@ static void put(const char *file, const char *bytes, size_t n)
 static size_t sign(char *copy, size_t n)
 {
   while (n > 0 && strncmp(copy + n, "\nsum ", 5)) n--;
-  const unsigned long long sum = jlaw_sum_of_(copy, copy + n + 1);
+  const unsigned long long sum = jlaw_checksum_(copy, copy + n + 1);
   return n + 1 + (size_t) sprintf(copy + n + 1, "sum %016llx\n", sum);
 }
 
 static int files(const char *file, const char *scratch, long count)
 {
   size_t length;
-  char *right = jlaw_load_(file, &length), *copy = (char *) malloc(length + 100);
+  char *right = jlaw_read_bytes_(file, &length), *copy = (char *) malloc(length + 100);
   jlaw_law *law = jlaw_read(file, message, sizeof message), *other;
-  const double closure = 1e-3 * fmin(law->largest_reach, 1e-3), F = one_step(law, closure);
+  const double closure = 1e-3 * fmin(law->max_effective_closure, 1e-3), F = one_step(law, closure);
   long passed = 0, signed_passed = 0;
   for (long k = 0; k < count; k++) {
     size_t n = length, at = (size_t) bits() % length;
@@ -178,7 +178,7 @@ static void *work(void *law)
     d[0] = k % 3 ? 1e-8 : -2e-8, d[1] = k % 100 < 50 ? 1e-8 : -1e-8;
     if (k % 7 == 0) d[0] = NAN;
     jlaw_update((jlaw_law *) law, s, s, d, F, k % 2 ? C : NULL, text, sizeof text);
-    if (k % 50 == 0) jlaw_shares((jlaw_law *) law, s, shares);
+    if (k % 50 == 0) jlaw_contact_fractions((jlaw_law *) law, s, shares);
   }
   return s;
 }

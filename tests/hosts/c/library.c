@@ -25,11 +25,11 @@ int main(int argc, char **argv)
   double *d = calloc(size, sizeof *d), *F = calloc(size, sizeof *F), *C = calloc(size * dim, sizeof *C);
   jlaw_batch b = {0};
   b.law = law, b.state = state, b.d = d, b.F = F, b.C = C;
-  b.n = (long long) n, b.grain = JLAW_BLOCK, b.rows = (int) rows, b.lanes = 2;
-  b.ledger = b.keep = 1;
+  b.n = (long long) n, b.chunk = JLAW_JOINTS_PER_BLOCK, b.rows = (int) rows, b.lanes = 2;
+  b.track_dissipation = b.commit = 1;
   while (fread(d, sizeof *d, size, stdin) == size) {
     double f[3], c[9];
-    b.taken = 0;
+    b.next = 0;
     if (advance(&b, 0)) return 3;
     if (jlaw_update(law, first, first, d, f, c, message, sizeof message)) return 4;
     if (memcmp(f, F, dim * sizeof *f) || memcmp(c, C, dim * dim * sizeof *c)) return 5;

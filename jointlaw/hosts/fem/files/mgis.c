@@ -50,8 +50,8 @@ static int jlf_step(const jlf_view *v, const double du[3], double *s1, double *T
 static int jlf_keep(const jlf_view *v, const double *s1, double thickness, double elastic)
 {
   memcpy(v->state, s1, STATE * sizeof *s1);
-  if (v->stored) *v->stored = jlaw_stored(&JOINT, s1) / thickness + elastic;
-  if (v->dissipated) *v->dissipated = jlaw_dissipated(&JOINT, s1) / thickness;
+  if (v->stored) *v->stored = jlaw_stored_energy(&JOINT, s1) / thickness + elastic;
+  if (v->dissipated) *v->dissipated = jlaw_dissipated_energy(&JOINT, s1) / thickness;
   return 1;
 }
 

@@ -40,6 +40,6 @@ void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *
   for (int i = 0; i < dim; i++) stress[at[i]] = T[i] / share;
   for (int i = 0; i < dim * dim; i++) /* column by column */
     ddsdde[at[i / dim] + n * at[i % dim]] = C[DIM * (i / dim) + i % dim] / (share * share);
-  *sse = jlaw_stored(&JOINT, s1);
-  *spd = jlaw_dissipated(&JOINT, s1);
+  *sse = jlaw_stored_energy(&JOINT, s1);
+  *spd = jlaw_dissipated_energy(&JOINT, s1);
 }

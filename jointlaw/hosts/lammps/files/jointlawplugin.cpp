@@ -293,14 +293,14 @@ void PairJointlaw::coeff(int narg, char **arg)
       MPI_Allreduce(&read, &all, 1, MPI_INT, MPI_MIN, world);
       if (!all) error->all(FLERR, "pair_coeff jointlaw: {}", message);
       laws.push_back({arg[2], law});
-      if (law->bonded && opening * law->opening_end < 1.0)
+      if (law->bonded && opening * law->inverse_failure_opening < 1.0)
         error->all(FLERR, "pair_coeff jointlaw: the bond of {} holds until the joint is {} m open, but "
                    "joints are given up at opening {} m: give pair_style a larger opening", arg[2],
-                   1.0 / law->opening_end, opening);
-      if (law->coulomb && opening * law->coulomb_normal < law->coulomb_tension)
+                   1.0 / law->inverse_failure_opening, opening);
+      if (law->coulomb && opening * law->coulomb_normal_stiffness < law->coulomb_tension)
         error->all(FLERR, "pair_coeff jointlaw: {} bears tension until the joint is {} m open, but "
                    "joints are given up at opening {} m: give pair_style a larger opening", arg[2],
-                   law->coulomb_tension / law->coulomb_normal, opening);
+                   law->coulomb_tension / law->coulomb_normal_stiffness, opening);
       if (jlaw_dim(law) != 3)
         error->all(FLERR, "pair_coeff jointlaw: {} is a law for {}; export one for space (no `{}` in "
                    "its parameters)", arg[2], jlaw_dim(law) == 1 ? "closure alone" : "motion in a plane",
@@ -593,7 +593,7 @@ void PairJointlaw::advance(const Contact &c)
     const Vector axis = across(c.n);
     std::copy(axis.begin(), axis.end(), head + AXIS);
     if (holds && !update->setupflag)    // faces that meet anew: the last number is its damage
-      own.at(which, size)[jlaw_state_size(law) - 1] = jlaw_parted_(law);
+      own.at(which, size)[jlaw_state_size(law) - 1] = jlaw_separated_damage_(law);
   }
   const int flag = fresh ? -1 : visits.back().flags + which;
   if (!fresh) seen[flag] = MET;
@@ -694,11 +694,11 @@ void PairJointlaw::bear(const Step &step, double *state, const double *F, const 
   }
   // a joint made between bodies that are closed already brings its energy with it
   const bool made_closed = fresh && c.closure + dt * dot(slide, c.n) > 0.0;
-  const double stored = eflag_either || made_closed ? c.area * jlaw_stored(law, state) : 0.0;
+  const double stored = eflag_either || made_closed ? c.area * jlaw_stored_energy(law, state) : 0.0;
   if (made_closed) joints_of->sums[FixJointlawMemory::GIVEN_UP] -= stored;
   if (eflag_either) {
     pvector[0]++;
-    pvector[1] += c.area * jlaw_dissipated(law, state);
+    pvector[1] += c.area * jlaw_dissipated_energy(law, state);
   }
   if (!stiffness.empty()) {    // as unsheared at this closure, or, dilated, as it is
     const double zero[3] = {0.0, 0.0, 0.0};
@@ -723,8 +723,8 @@ void PairJointlaw::end(int i, int which, bool given_up)
   const jlaw_law *law = law_between(atom->type[i], static_cast<int>(head[TYPE]));
   if (law) {
     double *sums = joints_of->sums;
-    sums[FixJointlawMemory::ENDED] += head[OF_AREA] * jlaw_dissipated(law, state);
-    const double stored = given_up ? head[OF_AREA] * jlaw_stored(law, state) : 0.0;
+    sums[FixJointlawMemory::ENDED] += head[OF_AREA] * jlaw_dissipated_energy(law, state);
+    const double stored = given_up ? head[OF_AREA] * jlaw_stored_energy(law, state) : 0.0;
     sums[FixJointlawMemory::GIVEN_UP] += stored;
     sums[FixJointlawMemory::COUNT] += stored > 0.0;
   }
@@ -800,9 +800,9 @@ PairJointlaw::show(const double *state, const jlaw_law *law) const
   double F[3], shares[3];
   std::vector<double> copy(state, state + rows);
   jlaw_update(law, state, copy.data(), zero, F, nullptr, nullptr, 0);
-  jlaw_shares(law, state, shares);
+  jlaw_contact_fractions(law, state, shares);
   return {head[PARTNER], state[0], hypot(state[1], state[2]), F[0], hypot(F[1], F[2]), shares[0],
-          head[OF_AREA] * jlaw_stored(law, state), head[OF_AREA] * jlaw_dissipated(law, state),
+          head[OF_AREA] * jlaw_stored_energy(law, state), head[OF_AREA] * jlaw_dissipated_energy(law, state),
           head[OF_AREA]};
 }
 

@@ -1,4 +1,4 @@
-"""`jointlaw browser`: a joint to drag, in the browser of this machine."""
+"""`jointlaw browser`: an interactive joint in the web browser of this machine."""
 
 import argparse
 import webbrowser
@@ -7,16 +7,16 @@ from ..hosts.browser.export import export_browser
 from .command import OUT, Command
 
 
-def _browser(options: argparse.Namespace) -> None:
-    made = export_browser(options.out).resolve()
-    print(f"wrote {made}: one file, which runs without a network; open it in a browser")
-    webbrowser.open(made.as_uri())
+def _run(options: argparse.Namespace) -> None:
+    page = export_browser(options.out).resolve()
+    print(f"wrote {page}: one file, which runs without a network; open it in a browser")
+    webbrowser.open(page.as_uri())
 
 
 COMMAND = Command(
     "browser",
-    "open a joint in your browser: drag it, and see its asperities stick, slip and part",
+    "open an interactive joint in your browser: drag it, and see asperities stick, slip, separate",
     "jointlaw browser --out joint",
-    _browser,
+    _run,
     OUT,
 )

@@ -1,6 +1,7 @@
-"""What the subcommands of `jointlaw` share: help with a worked example, options, results."""
+"""Parts shared by the subcommands of `jointlaw`: help with an example, options, results."""
 
 import argparse
+import json
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -13,28 +14,37 @@ from ..parameters import keys
 from ..parameters.resolution import NAMED
 from ..parameters.rock import ROCK, require_rock
 from ..support import units
-from ..support.files import clear_run, replace_file, write_json
+from ..support.files import SUMMARY, clear_run, replace_file, write_json
 from ..support.pyplot import FORMATS
 
-VERSION = 2  # of summary.json
-_CONTACTS = {name: getattr(ROCK, name) for name in ("K", "lam", "eta", "mu")}
-DEFAULT_ROCK = ", ".join(f"{name} = {value:.4g}" for name, value in _CONTACTS.items())
-Written = Mapping[str, str | Callable[[Path], object]]
+SUMMARY_VERSION = 2
+_ROCK_CONTACTS = {name: getattr(ROCK, name) for name in ("K", "lam", "eta", "mu")}
+DEFAULT_ROCK = ", ".join(f"{name} = {value:.4g}" for name, value in _ROCK_CONTACTS.items())
+Contents = Mapping[str, str | Callable[[Path], object]]  # of files: text, or a function that writes
 Option = tuple[tuple[str, ...], dict[str, Any]]
 
 
+class Group(NamedTuple):
+    """Options under a heading of their own in the help."""
+
+    title: str
+    options: tuple[Option, ...]
+
+
 class Command(NamedTuple):
-    """A subcommand: its one-line purpose, an example that runs as printed, what it does with its
-    options (it returns the exit status, None for success), and the options; or its own subcommands,
-    which are called hosts.
+    """A subcommand.
+
+    name: as it is typed. purpose: one line. example: a command that runs as printed.
+    run: takes the parsed options, returns the exit status, None for success.
+    options: its own options, alone or in groups. subcommands: one for each host, instead.
     """
 
     name: str
-    what: str
+    purpose: str
     example: str
     run: Callable[[argparse.Namespace], int | None]
-    options: tuple[Option, ...] = ()
-    parts: tuple["Command", ...] = ()
+    options: tuple[Option | Group, ...] = ()
+    subcommands: tuple["Command", ...] = ()
 
 
 def option(*names: str, **settings: Any) -> Option:
@@ -42,59 +52,59 @@ def option(*names: str, **settings: Any) -> Option:
     return names, settings
 
 
-def in_unit(unit: str, *, positive: bool = False) -> Callable[[str], float]:
-    """Type of an option such as 10MPa: a function that reads its SI value.
+def quantity(unit: str, *, positive: bool = False) -> Callable[[str], float]:
+    """Type of an option such as 10MPa: a function that returns the value in SI units.
 
-    unit: "Pa", "m", "Pa/m" or "rad"; only zero may be given without one.
+    unit: SI unit of the value; only zero may be typed without a unit. positive: refuse <= 0.
     """
 
-    def read(text: str) -> float:
+    def parse(text: str) -> float:
         try:
             return units.parse_option(text, unit, positive=positive)
         except ValueError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
 
-    return read
+    return parse
 
 
-def several(unit: str, *, positive: bool = False) -> Callable[[str], list[float]]:
-    """Type of an option such as 5MPa,20MPa: one quantity or several with commas between."""
-    return lambda text: [in_unit(unit, positive=positive)(part) for part in text.split(",")]
+def quantities(unit: str, *, positive: bool = False) -> Callable[[str], list[float]]:
+    """Type of an option such as 5MPa,20MPa: quantities separated by commas, in SI units."""
+    return lambda text: [quantity(unit, positive=positive)(part) for part in text.split(",")]
 
 
-LAW = (  # a preset or a file, and its resolution; `read_law` reads them
-    option("law", metavar="PRESET_OR_FILE", help="preset name or TOML file"),
+LAW = (  # read by `read_law`
+    option("law", metavar="PRESET_OR_FILE", help="a preset (see jointlaw presets) or a TOML file"),
     option(
         "--default-rock",
         action="store_true",
-        help="for a file without [asperity], such as that of a scan: " + DEFAULT_ROCK,
+        help="contacts for a file without [asperity], such as the result of a scan: "
+        + DEFAULT_ROCK,
     ),
-    option("--resolution", choices=tuple(NAMED), help="instead of the law's own"),
+    option(
+        "--resolution",
+        choices=tuple(NAMED),
+        help="number of springs and sliders (default: that of the preset or file)",
+    ),
 )
-OUT = (  # the folder for the results
+OUT = (
     option("--out", metavar="DIR", type=Path, required=True, help="folder for the results"),
     option(
         "--force", action="store_true", help="replace the results of another run in that folder"
     ),
 )
-PICTURES = option("--format", choices=FORMATS, default=FORMATS[0], help="of pictures (default png)")
+JSON = option("--json", action="store_true", help="print summary.json instead of text, for scripts")
+PICTURE_FORMAT = option(
+    "--format", choices=FORMATS, default=FORMATS[0], help="format of pictures (default png)"
+)
 
 
 def read_law(options: argparse.Namespace) -> Any:
-    """The law that the options name. Raises ValueError that says what is missing."""
+    """The law that the options `LAW` name. Raises ValueError naming the missing part."""
     path = Path(options.law)
     if options.law in presets.names() or not path.is_file():
         law = presets.load_any(options.law)
     else:
-        parts = keys.read(path, "law file")
-        coulomb = parts.get("kind") == "coulomb"
-        if "asperity" not in parts and not options.default_rock and not coulomb:
-            raise ValueError(
-                f"{path} has no contacts: add the table [asperity] with K (Pa m^(1-eta)), lam, eta "
-                f"and mu of your rock, or give --default-rock, which takes {DEFAULT_ROCK}"
-            )
-        own = {} if coulomb else {"asperity": _CONTACTS}
-        law = JointLaw.from_dict(own | parts, str(path))
+        law = _read_law_file(path, options.default_rock)
     require_rock({"plane": law.plane or 0.0}, f"{options.law}: ")
     if not isinstance(law, JointLaw):
         require_rock({"friction": law.friction}, f"{options.law}: ")
@@ -103,17 +113,35 @@ def read_law(options: argparse.Namespace) -> Any:
     return replace(law, resolution=options.resolution) if options.resolution else law
 
 
-def write_results(
-    folder: Path, files: Written, summary: Mapping[str, Any], picture_format: str
-) -> None:
-    """Write each file, its text or by its function, and summary.json.
+def _read_law_file(path: Path, default_rock: bool) -> Any:
+    """The law in a TOML file; contacts of `ROCK` complete a file without [asperity] on request."""
+    tables = keys.read(path, "law file")
+    if tables.get("kind") == "coulomb":
+        return JointLaw.from_dict(tables, str(path))
+    if "asperity" not in tables and not default_rock:
+        raise ValueError(
+            f"{path} has no contacts: add the table [asperity] with K (Pa m^(1-eta)), lam, eta "
+            f"and mu of your rock, or give --default-rock for {DEFAULT_ROCK}"
+        )
+    return JointLaw.from_dict({"asperity": _ROCK_CONTACTS} | tables, str(path))
 
-    A picture is named as PNG and written in its format; without matplotlib it is left out.
+
+def write_results(
+    options: argparse.Namespace, files: Contents, summary: Mapping[str, Any], text: str
+) -> None:
+    """Write the files and summary.json into the folder --out; print the text, or the summary.
+
+    files: by name. A picture is named *.png and written in the format --format; without matplotlib
+    it is left out, with a message.
+    summary: numbers for scripts; printed with --json instead of the text.
     """
+    folder = options.out
     clear_run(folder)
     names = []
     for name, content in files.items():
-        path = folder / name.replace(".png", f".{picture_format}")
+        path = folder / name
+        if path.suffix == ".png":
+            path = path.with_suffix(f".{options.format}")
         try:
             if isinstance(content, str):
                 replace_file(path, content.encode())
@@ -123,5 +151,19 @@ def write_results(
             print(f"no picture: {error}", file=sys.stderr)
         else:
             names.append(path.name)
-    write_json(folder / "summary.json", {"version": VERSION, **summary, "files": names})
-    print(f"wrote {', '.join([*names, 'summary.json'])} to {folder}")
+    write_json(folder / SUMMARY, {"version": SUMMARY_VERSION, **summary, "files": names})
+    if options.json:
+        print((folder / SUMMARY).read_text(encoding="utf-8"), end="")
+    else:
+        print(text)
+        print(f"wrote {', '.join([*names, SUMMARY])} to {folder}")
+
+
+def settings(options: argparse.Namespace) -> dict[str, Any]:
+    """The options of a command for its summary, without those that only direct the output."""
+    return {k: v for k, v in vars(options).items() if k not in ("run", "out", "force", "json")}
+
+
+def print_json(data: Any) -> None:
+    """Print data as JSON."""
+    print(json.dumps(data, indent=2, ensure_ascii=False))

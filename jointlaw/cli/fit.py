@@ -1,10 +1,11 @@
-"""`jointlaw fit`: measured closure and shear tests to one law, with report and picture."""
+"""`jointlaw fit`: one law for measured closure and shear tests, with report and picture."""
 
 import argparse
+from collections.abc import Sequence
 from functools import partial
 from itertools import compress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,114 +15,151 @@ from ..calibration.envelopes import FORMS, envelope, peak_and_last
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
-from ..support.checks import Array, one_of
+from ..support.checks import Array
 from ..support.markdown import table
 from ..support.text_numbers import DECIMAL_MARKS
-from .command import OUT, PICTURES, Command, Written, in_unit, option, several, write_results
+from .command import (
+    JSON,
+    OUT,
+    PICTURE_FORMAT,
+    Command,
+    Contents,
+    Group,
+    option,
+    quantities,
+    quantity,
+    write_results,
+)
 
-MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
-SAME = 0.02  # of a normal stress: tests that --fit names
-NEEDS = {  # what an option is about, where no such test is given
-    "data": (
-        "a closure test: name its file before --shear",
-        ("stress_column", "closure_column", "cycle", "noise", "compliance", "up_to"),
-    ),
-    "shear": (
-        "direct shear tests: name their files after --shear",
-        ("shear_column", "shear_stress_column", "normal_column", "opening_column", "area", "side",
-         "normal_stress"),
-    ),
-}  # fmt: skip
+MAX_SHEAR_POINTS = 60  # per shear test: a logger writes thousands, and each costs a step
+SAME_STRESS = 0.02  # relative difference of normal stresses that --fit takes as equal
+CLOSURE_OPTIONS = ("stress_column", "closure_column", "cycle", "noise", "compliance", "up_to")
+SHEAR_OPTIONS = (
+    "shear_column",
+    "shear_stress_column",
+    "normal_column",
+    "opening_column",
+    "area",
+    "side",
+    "normal_stress",
+)
+
+
+class HeldOut(NamedTuple):
+    """Points of a closure test that are predicted instead of fitted."""
+
+    stress: Array  # (n,) in Pa
+    closure: Array  # (n,) in m, of the joint alone
 
 
 def _compliance(text: str) -> float:
     """Type of an option such as 4.2um/10MPa: closure per stress in m/Pa."""
-    length, _, load = text.partition("/")
-    return in_unit("m")(length) / in_unit("Pa", positive=True)(load)
+    length, _, stress = text.partition("/")
+    return quantity("m")(length) / quantity("Pa", positive=True)(stress)
 
 
 def _run(options: argparse.Namespace) -> None:
-    shears = [*options.shear, *([options.peaks] if options.peaks else [])]
-    if len(options.data) > 1 or not (options.data or shears):
-        raise ValueError(
-            f"{len(options.data)} closure files: give one, or none and shear tests after --shear"
-        )
-    for tests, (about, names) in NEEDS.items():
-        for name in names:
-            if getattr(options, name) and not getattr(options, tests):
-                raise ValueError(f"--{name.replace('_', '-')} is about {about}, or leave it out")
-    keywords = _keywords(options)
-    closures, held = _closure_curve(options)
-    fitted, predicted = _shear_curves(options)
-    fit = fit_curves([*closures, *fitted], **keywords)
-    name = ", ".join(Path(item).name for item in [*options.data, *shears])
+    _require_consistent(options)
+    parameters = _fit_parameters(options)
+    closure_curves, held_out = _read_closure(options)
+    fitted, predicted = _split_shear_tests(_read_shear_tests(options), options.fit)
+    fit = fit_curves([*closure_curves, *fitted], **parameters)
+    shear_files = [*options.shear, *([options.peaks] if options.peaks else [])]
+    name = ", ".join(Path(file).name for file in [*options.data, *shear_files])
     require_rock(fit.parameters, f"{name}: the fitted ")
     text = fit.report()
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
-        "interval_95_SI": {one: fit.interval(one) for one in fit.free},
+        "interval_95_SI": {parameter: fit.interval(parameter) for parameter in fit.free},
         "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
     }
-    if held is not None:
-        error = fit.predict(held[1]) / held[0] - 1
+    if held_out is not None:
+        error = fit.predict(held_out.closure) / held_out.stress - 1
         summary["error_at_largest_stress"] = float(error[-1])
-        text += (
-            f"\nHeld out: {error.size} points. The predicted stress is off by "
-            f"{100 * error[-1]:+.1f} % at the largest, {held[0][-1] / 1e6:.4g} MPa, and by "
-            f"{100 * np.sqrt(np.mean(error**2)):.1f} % (rms) over all of them.\n"
-        )
+        text += _report_held_out(held_out, error)
     if predicted:
-        text += _misses(fit, fitted, predicted)
-    print(text)
-    files: Written = {
-        "fit.png": partial(fit.plot, held_out=held, predicted=predicted),
+        text += _report_predictions(fit, fitted, predicted)
+    files: Contents = {
+        "fit.png": partial(fit.plot, held_out=held_out, predicted=predicted),
         "law.toml": fit.law.to_toml,
         "report.md": text,
     }
-    write_results(options.out, files, summary, options.format)
+    write_results(options, files, summary, text)
 
 
-def _closure_curve(
-    options: argparse.Namespace,
-) -> tuple[list[ClosureCurve], tuple[Array, Array] | None]:
-    """The closure curve to fit, if there is one; stress (Pa) and closure (m) of points held out."""
+def _require_consistent(options: argparse.Namespace) -> None:
+    """Refuse options that contradict each other or have no test. Raises ValueError."""
+    shear_files = [*options.shear, *([options.peaks] if options.peaks else [])]
+    if len(options.data) > 1 or not (options.data or shear_files):
+        raise ValueError(
+            f"{len(options.data)} closure files: give one, or none and shear tests after --shear"
+        )
+    if not options.data:
+        _refuse(options, CLOSURE_OPTIONS, "a closure test: name its file before --shear")
+    if not options.shear:
+        _refuse(options, SHEAR_OPTIONS, "direct shear tests: name their files after --shear")
+    if options.up_to and options.cycle:
+        raise ValueError("--cycle fits all points: leave --up-to out")
+
+
+def _refuse(options: argparse.Namespace, names: Sequence[str], subject: str) -> None:
+    """Refuse options whose test is missing. Raises ValueError."""
+    for name in names:
+        if getattr(options, name):
+            raise ValueError(f"--{name.replace('_', '-')} is about {subject}, or leave it out")
+
+
+def _read_closure(options: argparse.Namespace) -> tuple[list[ClosureCurve], HeldOut | None]:
+    """The closure curve to fit, if there is one, and the points above --up-to."""
     if not options.data:
         return [], None
-    item, compliance, notes = options.data[0], options.compliance, list[str]()
+    item = options.data[0]
+    notes: list[str] = []
     if Path(item).exists():
         stress, closure, notes = datasets.read_closure(
             item, options.stress_column, options.closure_column, options.decimal, options.outliers
         )
-    else:
-        one_of("the closure test, no file and as data set,", item, tuple(datasets.names()))
+    elif item in datasets.names():
         stress, closure = datasets.load(item)
-    rows = stress.size
+    else:
+        raise ValueError(
+            f"closure test {item!r}: neither a file nor a data set ({', '.join(datasets.names())})"
+        )
     if not options.cycle:
+        rows = stress.size
         stress, closure = first_loading(stress, closure)
         if stress.size < rows:
-            told = f"{rows - stress.size} of {rows} rows unload or load again up to where they were"
-            notes.append(f"{told}: --cycle fits them")
-    if options.up_to and options.cycle:
-        raise ValueError("--cycle fits all points: leave --up-to out")
-    seen = stress <= (options.up_to or np.inf)
+            notes.append(
+                f"{rows - stress.size} of {rows} rows are unloading or reloading: --cycle fits "
+                "them too"
+            )
+    is_fitted = stress <= (options.up_to or np.inf)
     curve = ClosureCurve(
-        stress[seen], closure[seen], options.noise, options.cycle, compliance, item, tuple(notes)
+        stress[is_fitted],
+        closure[is_fitted],
+        options.noise,
+        options.cycle,
+        options.compliance,
+        item,
+        tuple(notes),
     )
-    held = stress[~seen], closure[~seen] - compliance * stress[~seen]
-    return [curve], None if seen.all() else held
+    if is_fitted.all():
+        return [curve], None
+    above = stress[~is_fitted]
+    return [curve], HeldOut(above, closure[~is_fitted] - options.compliance * above)
 
 
-def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[ShearCurve]]:
-    """The shear tests to fit, thinned to `MOST` points each, and those to predict."""
-    normals = options.normal_stress or [None] * len(options.shear)
-    if len(normals) != len(options.shear):
+def _read_shear_tests(options: argparse.Namespace) -> list[ShearCurve]:
+    """All shear tests of --shear, with at most `MAX_SHEAR_POINTS` each, and of --peaks."""
+    normal_stresses = options.normal_stress or [None] * len(options.shear)
+    if len(normal_stresses) != len(options.shear):
         raise ValueError(
-            f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} files of "
-            "shear tests: give one for each"
+            f"--normal-stress gives {len(normal_stresses)} stresses for {len(options.shear)} files "
+            "of shear tests: give one for each"
         )
-    how = {
+    format_options = {
         "shear": options.shear_column,
         "stress": options.shear_stress_column,
         "normal": options.normal_column,
@@ -131,151 +169,219 @@ def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[S
         "area": options.area,
         "side": options.side,
     }
-    tests = [
-        test.thinned(MOST)
-        for path, normal in zip(options.shear, normals, strict=True)
-        for test in datasets.read_shear(path, normal_stress=normal, **how)
-    ]
-    tests += (
-        datasets.read_peaks(options.peaks, options.decimal, options.outliers)
-        if options.peaks
-        else []
-    )
-    if options.fit is None:
+    tests = []
+    for path, normal_stress in zip(options.shear, normal_stresses, strict=True):
+        for test in datasets.read_shear(path, normal_stress=normal_stress, **format_options):
+            tests.append(test.thinned(MAX_SHEAR_POINTS))
+    if options.peaks:
+        tests += datasets.read_peaks(options.peaks, options.decimal, options.outliers)
+    return tests
+
+
+def _split_shear_tests(
+    tests: list[ShearCurve], stresses: list[float] | None
+) -> tuple[list[ShearCurve], list[ShearCurve]]:
+    """The shear tests at these normal stresses (Pa), to be fitted, and all others, to be predicted.
+
+    None fits all of them.
+    """
+    if stresses is None:
         return tests, []
-    given = [float(np.mean(test.normal)) for test in tests]
-    fit = [any(abs(at - one) <= SAME * one for one in options.fit) for at in given]
-    if sum(fit) < 2 or all(fit):
+    normal = [float(np.mean(test.normal)) for test in tests]
+    is_fitted = [
+        any(abs(mean - stress) <= SAME_STRESS * stress for stress in stresses) for mean in normal
+    ]
+    if sum(is_fitted) < 2 or all(is_fitted):
         raise ValueError(
-            f"--fit names {sum(fit)} of {len(tests)} shear tests, at "
-            f"{', '.join(f'{at / 1e6:.3g}MPa' for at in given)}: name two or more, and leave one"
+            f"--fit names {sum(is_fitted)} of {len(tests)} shear tests, at "
+            f"{', '.join(f'{mean / 1e6:.3g}MPa' for mean in normal)}: name two or more, and leave "
+            "one out"
         )
-    return list(compress(tests, fit)), list(compress(tests, np.logical_not(fit)))
+    return list(compress(tests, is_fitted)), list(compress(tests, np.logical_not(is_fitted)))
 
 
-def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> str:
-    """How far predictions miss, those of envelopes through the same tests beside (Markdown)."""
+def _report_held_out(held_out: HeldOut, error: Array) -> str:
+    """Errors of the predicted stress at points that were not fitted (Markdown)."""
+    return (
+        f"\nHeld out: {error.size} points above the fitted stress. Error of the predicted stress: "
+        f"{100 * error[-1]:+.1f} % at the largest, {held_out.stress[-1] / 1e6:.4g} MPa; "
+        f"{100 * np.sqrt(np.mean(error**2)):.1f} % rms over all of them.\n"
+    )
+
+
+def _report_predictions(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> str:
+    """Errors of the predicted shear tests, beside envelopes of the fitted ones (Markdown)."""
     rows = []
     for curve, test in zip(predicted, fit.predict_shear(*predicted), strict=True):
-        measured, normal = peak_and_last(curve.shear_stress), float(np.mean(curve.normal))
-        found = [peak_and_last(test.stress), *(envelope(form, fitted, normal) for form in FORMS)]
-        cells = ["{:+.1f}, {:+.1f} %".format(*(100 * (one / measured - 1))) for one in found]
-        told = "{:.4g}, {:.4g}".format(*(measured / 1e6))
-        rows.append(" | ".join([curve.name, told, *cells]))
+        measured = peak_and_last(curve.shear_stress)
+        normal = float(np.mean(curve.normal))
+        predictions = [peak_and_last(test.stress)]
+        predictions += [envelope(form, fitted, normal) for form in FORMS]
+        cells = [curve.name, "{:.4g}, {:.4g}".format(*(measured / 1e6))]
+        for prediction in predictions:
+            cells.append("{:+.1f}, {:+.1f} %".format(*(100 * (prediction / measured - 1))))
+        rows.append(" | ".join(cells))
     head = f"test | peak, last (MPa) | law | {' | '.join(FORMS)}"
-    what = "Tests that were not fitted: errors of the predicted peak and last shear stress."
-    return "\n".join(["", what, "", *table(head, rows), ""])
+    introduction = (
+        "Errors of the predicted peak and last shear stress, for tests that were not fitted:"
+    )
+    return "\n".join(["", introduction, "", *table(head, rows), ""])
 
 
-def _keywords(options: argparse.Namespace) -> dict[str, Any]:
-    """What `fit_curves` takes besides the curves."""
+def _fit_parameters(options: argparse.Namespace) -> dict[str, Any]:
+    """Keyword arguments of `fit_curves`: free and fixed parameters, and the initial law."""
     free = [name.strip() for name in options.free.split(",")] if options.free else None
-    pairs = (item.partition("=") for item in options.set)
-    try:
-        fixed = {name.strip(): float(value) for name, _, value in pairs}
-    except ValueError:
-        raise ValueError(
-            f"--set {options.set}: write a name and a number each, such as alpha=3.8"
-        ) from None
+    fixed = {}
+    for item in options.set:
+        name, _, value = item.partition("=")
+        try:
+            fixed[name.strip()] = float(value)
+        except ValueError:
+            raise ValueError(
+                f"--set {item}: write a name and a number, such as --set alpha=3.8"
+            ) from None
     law = presets.load_any(options.law) if options.law else None
     return {"fixed": fixed, "free": free, "law": law}
 
 
-COMMAND = Command(
-    "fit",
-    "fit the law to measured closure and shear curves; write preset, report and plot",
-    "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out",
-    _run,
+_CLOSURE = Group(
+    "closure test",
     (
-        option(
-            "data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set"
-        ),
-        option("--stress-column", help="name and unit of that column, such as sigmaZ:MPa"),
-        option("--closure-column", help="name and unit of that column, such as Disp:mm"),
-        option(
-            "--shear",
-            nargs="+",
-            metavar="CSV",
-            default=[],
-            help="direct shear tests, several to a file or one, as CSV or XLSX. Their normal "
-            "stress is in a column or after --normal-stress. One law is fitted to all of them and "
-            "to the closure test, if one is given before",
-        ),
-        option(
-            "--peaks",
-            metavar="CSV",
-            help="a table with one shear test a row: normal_stress, peak_shear_stress, "
-            "peak_displacement, residual_shear_stress, residual_displacement, with units",
-        ),
-        option("--shear-column", help="name and unit of that column, such as us:mm"),
-        option("--shear-stress-column", help="name and unit of that column: tau:MPa"),
-        option("--normal-column", help="name and unit of that column: sn:MPa"),
-        option("--opening-column", help="name and unit of that column, opening positive: dn:mm"),
-        option("--area", type=in_unit("m2", positive=True), help="that forces act on: 100cm2"),
-        option(
-            "--side",
-            type=in_unit("m", positive=True),
-            help="of an area that slip makes smaller: 10cm",
-        ),
-        option(
-            "--normal-stress",
-            metavar="STRESSES",
-            type=several("Pa", positive=True),
-            help="of the shear tests in their order: 1MPa,3MPa",
-        ),
-        option(
-            "--decimal",
-            choices=tuple(DECIMAL_MARKS),
-            help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do "
-            "not",
-        ),
-        option(
-            "--outliers",
-            choices=("skip", "keep"),
-            help="what to do with rows that may be no measurement; they are named first",
-        ),
-        option(
-            "--fit",
-            metavar="STRESSES",
-            type=several("Pa", positive=True),
-            help="fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
-        ),
+        option("--stress-column", metavar="NAME:UNIT", help="normal stress, such as sigmaZ:MPa"),
+        option("--closure-column", metavar="NAME:UNIT", help="closure, such as Disp:mm"),
         option(
             "--up-to",
-            type=in_unit("Pa", positive=True),
-            help="fit up to this stress, predict the rest: 5.3MPa",
+            metavar="STRESS",
+            type=quantity("Pa", positive=True),
+            help="fit points up to this stress and predict the others, such as 5.3MPa",
         ),
         option(
-            "--cycle", action="store_true", help="fit unloading too, and with it yield_interference"
+            "--cycle",
+            action="store_true",
+            help="fit unloading and reloading too, with yield_interference",
         ),
         option(
             "--compliance",
             metavar="LENGTH/STRESS",
             type=_compliance,
             default=0.0,
-            help="of rock and machine, such as 4.2um/10MPa: it is subtracted first",
+            help="compliance of intact rock and machine, such as 4.2um/10MPa: their closure is "
+            "subtracted first",
         ),
         option(
-            "--noise", type=float, help="known error of the closure test's stress, such as 0.01"
+            "--noise",
+            metavar="FRACTION",
+            type=float,
+            help="relative standard error of the stress, if it is known, such as 0.01",
         ),
+    ),
+)
+_SHEAR = Group(
+    "direct shear tests",
+    (
+        option(
+            "--shear",
+            nargs="+",
+            metavar="FILE",
+            default=[],
+            help="CSV or XLSX files with one or several tests each",
+        ),
+        option(
+            "--peaks",
+            metavar="FILE",
+            help="a table with one test in each row: normal_stress, peak_shear_stress, "
+            "peak_displacement, residual_shear_stress, residual_displacement, with units",
+        ),
+        option(
+            "--normal-stress",
+            metavar="STRESSES",
+            type=quantities("Pa", positive=True),
+            help="normal stress of each file, if it is not in a column: 1MPa,3MPa",
+        ),
+        option("--shear-column", metavar="NAME:UNIT", help="shear displacement, such as us:mm"),
+        option("--shear-stress-column", metavar="NAME:UNIT", help="shear stress, such as tau:MPa"),
+        option("--normal-column", metavar="NAME:UNIT", help="normal stress, such as sn:MPa"),
+        option(
+            "--opening-column",
+            metavar="NAME:UNIT",
+            help="normal displacement, opening positive, such as dn:mm",
+        ),
+        option(
+            "--area",
+            metavar="AREA",
+            type=quantity("m2", positive=True),
+            help="area of the joint, for columns with forces, such as 100cm2",
+        ),
+        option(
+            "--side",
+            metavar="LENGTH",
+            type=quantity("m", positive=True),
+            help="length of the specimen along the shear, such as 10cm: the area shrinks with slip",
+        ),
+        option(
+            "--fit",
+            metavar="STRESSES",
+            type=quantities("Pa", positive=True),
+            help="fit the tests at these normal stresses and predict the others: 1MPa,3MPa,5MPa",
+        ),
+    ),
+)
+_FILES = Group(
+    "files",
+    (
+        option(
+            "--decimal",
+            choices=tuple(DECIMAL_MARKS),
+            help="decimal mark, if no number of a file shows it (1,201 and 1.201 do not)",
+        ),
+        option(
+            "--outliers",
+            choices=("skip", "keep"),
+            help="how to treat outliers; without this option they are listed and refused",
+        ),
+    ),
+)
+_PARAMETERS = Group(
+    "parameters",
+    (
         option(
             "--set",
             action="append",
             default=[],
             metavar="NAME=VALUE",
-            help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
+            help="fix a parameter, in SI units, such as alpha=3.8; repeatable",
         ),
         option(
             "--free",
             metavar="NAMES",
-            help="parameters to fit, with commas between; default asperity_density, of closure "
-            "tests alpha and beta, with --cycle yield_interference, of shear tests mu, a and "
-            "mating_length",
+            help="parameters to fit, separated by commas (default: asperity_density; for closure "
+            "tests alpha and beta, with --cycle yield_interference; for shear tests mu, a and "
+            "mating_length)",
         ),
         option(
-            "--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted"
+            "--law",
+            metavar="PRESET_OR_FILE",
+            help="values of all fixed parameters (default: contacts of an average rock)",
         ),
-        *OUT,
-        PICTURES,
+    ),
+)
+COMMAND = Command(
+    "fit",
+    "fit one law to measured closure and shear tests; write law, report and picture",
+    "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out",
+    _run,
+    (
+        option(
+            "data",
+            nargs="*",
+            metavar="CLOSURE_TEST",
+            help="CSV or XLSX file with stress and closure, or a data set of the package "
+            f"({', '.join(datasets.names())})",
+        ),
+        _CLOSURE,
+        _SHEAR,
+        _FILES,
+        _PARAMETERS,
+        Group("output", (*OUT, JSON, PICTURE_FORMAT)),
     ),
 )

@@ -14,26 +14,28 @@ from ..laboratory.record import UNITS, TestRecord
 from ..laws.joint_law import JointLaw
 from ..parameters.rock import require_rock
 from .command import (
+    JSON,
     LAW,
     OUT,
-    PICTURES,
+    PICTURE_FORMAT,
     Command,
-    Option,
-    Written,
-    in_unit,
+    Contents,
+    Group,
     option,
+    quantities,
+    quantity,
     read_law,
-    several,
+    settings,
     write_results,
 )
 
+_CSV_UNITS = ("m,Pa", "mm,kPa", "mm,MPa", "um,MPa")
 
-def _shear(options: argparse.Namespace) -> None:
+
+def _run_shear(options: argparse.Namespace) -> None:
     require_rock({"normal stress": options.normal_stress}, "--normal-stress: ")
     law = read_law(options)
-    record = _run(
-        law,
-        options,
+    test = partial(
         direct_shear,
         law.joint(),
         [options.to, *options.reverse],
@@ -42,133 +44,171 @@ def _shear(options: argparse.Namespace) -> None:
         options.azimuth,
         options.steps,
     )
-    peak = "peak friction angle" if record.has_peak else "no peak: largest friction angle"
-    secant = record.secant_stiffness
-    print(
-        f"{peak} {record.peak_friction_angle:.2f} deg, at the end "
-        f"{record.residual_friction_angle:.2f} deg, largest dilation angle "
-        f"{record.peak_dilation_angle:.2f} deg"
-        + ("" if math.isnan(secant) else f", secant shear stiffness {secant:.4g} Pa/m")
-    )
+    _run_test(test, _describe_shear, law, options)
 
 
-def _closure(options: argparse.Namespace) -> None:
+def _describe_shear(record: TestRecord) -> str:
+    """Friction and dilation of a shear test, for the terminal."""
+    kind = "peak friction angle" if record.has_peak else "largest friction angle (no peak)"
+    lines = [
+        f"{kind}: {record.peak_friction_angle:.2f} deg",
+        f"final friction angle: {record.residual_friction_angle:.2f} deg",
+        f"largest dilation angle: {record.peak_dilation_angle:.2f} deg",
+    ]
+    stiffness = record.secant_stiffness
+    if not math.isnan(stiffness):
+        lines.append(f"secant shear stiffness up to there: {stiffness:.4g} Pa/m")
+    return "\n".join(lines)
+
+
+def _run_closure(options: argparse.Namespace) -> None:
     for stress in options.normal_stress:
         require_rock({"normal stress": stress}, "--normal-stress: ")
     law = read_law(options)
-    joint = replace(law, plane=None, closure_only=True).joint()  # the same numbers, sooner
-    record = _run(law, options, closure_test, joint, options.normal_stress, options.steps)
-    at = int(np.argmax(record.F1))
-    print(
-        f"closure {1e6 * record.closure[at]:.4g} um at {1e-6 * record.F1[at]:.4g} MPa, "
-        f"{record.dissipated[-1]:.3g} J/m2 lost, {joint.plastic_work:.3g} of it to yielding"
-    )
+    joint = replace(law, plane=None, closure_only=True).joint()  # same numbers, fewer sliders
+    test = partial(closure_test, joint, options.normal_stress, options.steps)
+
+    def describe(record: TestRecord) -> str:
+        row = int(np.argmax(record.F1))
+        return (
+            f"closure at {1e-6 * record.F1[row]:.4g} MPa: {1e6 * record.closure[row]:.4g} um\n"
+            f"dissipated energy: {record.dissipated[-1]:.3g} J/m2, of which plastic work of "
+            f"asperities: {joint.plastic_work:.3g}"
+        )
+
+    _run_test(test, describe, law, options)
 
 
-def _run(
-    law: JointLaw, options: argparse.Namespace, test: Callable[..., TestRecord], *arguments: Any
-) -> TestRecord:
-    """Run a test and write its record, also that of a test that stopped early."""
+def _run_test(
+    test: Callable[[], TestRecord],
+    describe: Callable[[TestRecord], str],
+    law: JointLaw,
+    options: argparse.Namespace,
+) -> None:
+    """Run a test and write its record, also the record of a test that stopped early."""
     try:
-        record = test(*arguments)
+        record = test()
     except PathError as error:
         if len(error.record):
-            _write(error.record, law, options)
+            _write(error.record, describe(error.record), law, options)
         raise
-    _write(record, law, options)
-    return record
+    _write(record, describe(record), law, options)
 
 
-def _write(record: TestRecord, law: JointLaw, options: argparse.Namespace) -> None:
-    """Curve (CSV), picture, law and summary of a test."""
-    name, (length, stress) = options.command, options.units.split(",")
-    files: Written = {
-        f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
+def _write(record: TestRecord, text: str, law: JointLaw, options: argparse.Namespace) -> None:
+    """Write curve (CSV), picture, law and summary of a test."""
+    length, stress = options.units.split(",")
+    files: Contents = {
+        f"{options.command}.csv": partial(record.to_csv, length=length, stress=stress),
         "law.toml": law.to_toml,
-        f"{name}.png": record.plot,
+        f"{options.command}.png": record.plot,
     }
-    settings = {k: v for k, v in vars(options).items() if k not in ("run", "out", "force")}
-    summary = {"settings_SI": settings, "result": record.summary(), "units": UNITS}
-    write_results(options.out, files, summary, options.format)
+    summary: dict[str, Any] = {
+        "settings_SI": settings(options),
+        "result": record.summary(),
+        "units": UNITS,
+    }
+    write_results(options, files, summary, text)
 
 
-def _common(steps: int) -> tuple[Option, ...]:
+def _output(steps: int) -> Group:
     """Options of both commands."""
-    return (
-        *LAW,
-        option(
-            "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
+    return Group(
+        "output",
+        (
+            *OUT,
+            JSON,
+            PICTURE_FORMAT,
+            option(
+                "--steps",
+                metavar="N",
+                type=int,
+                default=steps,
+                help=f"steps from one turning point to the next (default {steps})",
+            ),
+            option(
+                "--units",
+                metavar="LENGTH,STRESS",
+                choices=_CSV_UNITS,
+                default=_CSV_UNITS[0],
+                help=f"units of the CSV file: {' or '.join(_CSV_UNITS)} (default {_CSV_UNITS[0]})",
+            ),
         ),
-        option(
-            "--units",
-            metavar="LENGTH,STRESS",
-            choices=("m,Pa", "mm,kPa", "mm,MPa", "um,MPa"),
-            default="m,Pa",
-            help="of the CSV: one of m,Pa (default) or mm,kPa or mm,MPa or um,MPa",
-        ),
-        *OUT,
-        PICTURES,
     )
 
 
 SHEAR = Command(
     "shear",
-    "direct shear test: seat the joint at a normal stress, shear it, write curve and picture",
+    "direct shear test: apply a normal stress, shear the joint, write the curve and a picture",
     "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse -2um --out out",
-    _shear,
+    _run_shear,
     (
-        option(
-            "--normal-stress",
-            metavar="STRESS",
-            type=in_unit("Pa", positive=True),
-            default="10MPa",
-            help="normal stress (default 10MPa)",
+        *LAW,
+        Group(
+            "test",
+            (
+                option(
+                    "--normal-stress",
+                    metavar="STRESS",
+                    type=quantity("Pa", positive=True),
+                    default="10MPa",
+                    help="normal stress (default 10MPa)",
+                ),
+                option(
+                    "--to",
+                    metavar="LENGTH",
+                    type=quantity("m"),
+                    required=True,
+                    help="shear displacement, such as 2um",
+                ),
+                option(
+                    "--reverse",
+                    metavar="LENGTHS",
+                    type=quantities("m"),
+                    default=[],
+                    help="shear displacements of further turning points, separated by commas: "
+                    "--reverse -2um,0",
+                ),
+                option(
+                    "--azimuth",
+                    metavar="ANGLE",
+                    type=quantity("rad"),
+                    default="0",
+                    help="direction of shear from axis 2 towards axis 3, such as 30deg (default 0)",
+                ),
+                option(
+                    "--normal-stiffness",
+                    metavar="STIFFNESS",
+                    type=quantity("Pa/m"),
+                    default="0",
+                    help="constant normal stiffness (CNS) of the surrounding rock, such as 5GPa/m: "
+                    "dilation raises the normal stress (default 0: constant normal load, CNL)",
+                ),
+            ),
         ),
-        option(
-            "--to",
-            metavar="LENGTH",
-            type=in_unit("m"),
-            required=True,
-            help="shear displacement, such as 2um",
-        ),
-        option(
-            "--reverse",
-            metavar="LENGTHS",
-            type=several("m"),
-            default=[],
-            help="further turning points, separated by commas: --reverse -2um,0",
-        ),
-        option(
-            "--azimuth",
-            metavar="ANGLE",
-            type=in_unit("rad"),
-            default="0",
-            help="direction of shear from axis 2 towards axis 3, such as 30deg (default 0)",
-        ),
-        option(
-            "--normal-stiffness",
-            metavar="STIFFNESS",
-            type=in_unit("Pa/m"),
-            default="0",
-            help="of the surroundings, such as 5GPa/m: the normal stress grows by it times the "
-            "dilation (default 0: it is kept)",
-        ),
-        *_common(steps=200),
+        _output(steps=200),
     ),
 )
 CLOSURE = Command(
     "closure",
-    "closure test: load the joint to a normal stress and unload it",
+    "closure test: load the joint to a normal stress and unload it, in one or more cycles",
     "jointlaw closure westerly-smooth --normal-stress 20MPa --out out",
-    _closure,
+    _run_closure,
     (
-        option(
-            "--normal-stress",
-            metavar="STRESSES",
-            type=several("Pa", positive=True),
-            default="20MPa",
-            help="largest normal stress (default 20MPa), or one per cycle: 5MPa,20MPa",
+        *LAW,
+        Group(
+            "test",
+            (
+                option(
+                    "--normal-stress",
+                    metavar="STRESSES",
+                    type=quantities("Pa", positive=True),
+                    default="20MPa",
+                    help="largest normal stress of each cycle, separated by commas: 5MPa,20MPa "
+                    "(default 20MPa)",
+                ),
+            ),
         ),
-        *_common(steps=100),
+        _output(steps=100),
     ),
 )

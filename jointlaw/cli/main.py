@@ -11,22 +11,31 @@ from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
 from . import browser, export, field, fit, laboratory, presets, scan
-from .command import Command
+from .command import Command, Group
 
 COMMANDS = (
     browser.COMMAND,
-    laboratory.SHEAR,
-    laboratory.CLOSURE,
     presets.COMMAND,
-    export.COMMAND,
+    laboratory.CLOSURE,
+    laboratory.SHEAR,
     fit.COMMAND,
     scan.COMMAND,
     field.COMMAND,
+    export.COMMAND,
 )
+EPILOG = """\
+examples:
+  jointlaw browser --out joint
+  jointlaw shear biegel-rough --to 2um --out out
+  jointlaw shear --help
+
+Quantities are typed with their unit: 10MPa, 2um, 30deg, 5GPa/m.
+"""
+EXIT_FAILED_TEST, EXIT_INVALID_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line each, as those of the commands are."""
+    """A parser that raises ValueError with one line, instead of printing its usage."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
@@ -34,54 +43,67 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def error(self, message: str) -> NoReturn:
-        """Raise ValueError; `main` prints it."""
-        raise ValueError(message.removeprefix("argument "))
+        """Raise ValueError with the message; `main` prints it."""
+        raise ValueError(f"{message.removeprefix('argument ')} (help: {self.prog} --help)")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status."""
+    """Run one command; returns the exit status (docs/api.md)."""
     words = sys.argv[1:] if arguments is None else arguments
     name = " ".join(["jointlaw", *words[:1]])
     try:
-        options = _read(words)
+        options = _parse(words)
         if getattr(options, "out", None) and not options.force:
             require_free(options.out)
         return int(options.run(options) or 0)
     except KeyboardInterrupt:
-        print(f"{name}: interrupted; nothing more is written", file=sys.stderr)
-        return 130
-    except (PathError, ValueError, ImportError, OSError) as error:
+        print(f"{name}: interrupted; no further files are written", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except PathError as error:
         print(f"{name}: {error}", file=sys.stderr)
-        return 1 if isinstance(error, PathError) else 2
+        return EXIT_FAILED_TEST
+    except (ValueError, ImportError, OSError) as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return EXIT_INVALID_INPUT
 
 
-def _read(words: Sequence[str]) -> argparse.Namespace:
+def _parse(words: Sequence[str]) -> argparse.Namespace:
     """The options of the command line. Raises ValueError with one line for the user."""
     parser = Parser(
         prog="jointlaw",
-        description="A micromechanical, anisotropic, path-dependent rock joint.",
-        epilog="each command has its own help with an example: jointlaw shear --help",
+        description="Micromechanical law of rock joints: laboratory tests, fits, exports to hosts.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.set_defaults(run=lambda options: parser.print_help())
     parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    _add(commands, COMMANDS)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    _add_commands(commands, COMMANDS)
     if words and not words[0].startswith("-"):
         one_of("the command", words[0], tuple(commands.choices))
     return parser.parse_args(words)
 
 
-def _add(commands: Any, ours: Sequence[Command]) -> None:
-    """Add commands with their options, and those of their own."""
-    for one in ours:
-        command = commands.add_parser(
-            one.name,
-            help=one.what,
-            description=one.what,
-            epilog=f"example:\n  {one.example}",
+def _add_commands(parsers: Any, commands: Sequence[Command]) -> None:
+    """Add a parser for each command with its options, and for its subcommands."""
+    for command in commands:
+        parser = parsers.add_parser(
+            command.name,
+            help=command.purpose,
+            description=command.purpose[0].upper() + command.purpose[1:] + ".",
+            epilog=f"example:\n  {command.example}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        command.set_defaults(run=one.run)
-        for names, settings in one.options:
-            command.add_argument(*names, **settings)
-        if one.parts:
-            _add(command.add_subparsers(dest="host", required=True, metavar="HOST"), one.parts)
+        parser.set_defaults(run=command.run)
+        for item in command.options:
+            if isinstance(item, Group):
+                group = parser.add_argument_group(item.title)
+                for names, settings in item.options:
+                    group.add_argument(*names, **settings)
+            else:
+                names, settings = item
+                parser.add_argument(*names, **settings)
+        if command.subcommands:
+            parser.set_defaults(run=lambda options, parser=parser: parser.print_help())
+            hosts = parser.add_subparsers(dest="host", metavar="HOST", title="hosts")
+            _add_commands(hosts, command.subcommands)

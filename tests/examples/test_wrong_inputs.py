@@ -78,7 +78,10 @@ def _files(tmp_path):
             "jointlaw fit --shear good.csv --normal-stress 1MPa --fit 1MPa --out out",
             "--fit names 1 of 1",
         ),
-        ("jointlaw fit nope --out out", "'nope' is unknown; choose one of grimsel_vd1_closure"),
+        (
+            "jointlaw fit nope --out out",
+            "'nope': neither a file nor a data set (grimsel",
+        ),
         ("jointlaw sheer biegel-rough --to 2um --out out", "did you mean 'shear'?"),
         ("jointlaw fit --shear tension.csv --out out", '--normal-column "sn:-1MPa"'),
         ("jointlaw fit --shear closure.csv --out out", "which column is the shear displacement"),
@@ -132,7 +135,10 @@ def _files(tmp_path):
         ("jointlaw fit good.csv --compliance rock.csv --out out", "'rock.csv' is not a quantity"),
         ("jointlaw fit closure.csv --cycle --up-to 1MPa --out out", "leave --up-to out"),
         ("jointlaw fit closure.csv --law nothing --out out", "'nothing' is neither a preset"),
-        ("jointlaw fit closure.csv --set alpha=high --out out", "write a name and a number each"),
+        (
+            "jointlaw fit closure.csv --set alpha=high --out out",
+            "write a name and a number",
+        ),
         ("jointlaw scan z.nc --spacing 20um --height-unit m --out out", "for example numpy.save"),
         ("dem_demo scene.toml --until=inf --out out", "until = inf s: inf steps"),
         ("dem_demo check endless.toml", "until = 1e+308 s: "),
@@ -163,7 +169,7 @@ def test_ctrl_c_ends_a_command_in_one_line(line, where, capsys, monkeypatch):
     monkeypatch.setattr(f"jointlaw.cli.{where}", Mock(side_effect=KeyboardInterrupt))
     assert jointlaw_main(line.split()) == 130
     assert capsys.readouterr().err == (
-        f"jointlaw {line.split()[0]}: interrupted; nothing more is written\n"
+        f"jointlaw {line.split()[0]}: interrupted; no further files are written\n"
     )
     assert not Path("out").exists()
 

@@ -1,4 +1,4 @@
-"""The commands, as a newcomer types them, and the quantities that they take."""
+"""The commands as a newcomer types them, and the quantities that they accept."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter
 
 import jointlaw as jl
 from jointlaw import hosts
-from jointlaw.cli.export import START
+from jointlaw.cli.export import RUN_COMMANDS
 from jointlaw.cli.main import COMMANDS, main
 from jointlaw.hosts.c.export import identifier, require_name
 from jointlaw.support import units
@@ -23,12 +23,12 @@ pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 
 def run(line):
-    """One command line, typed."""
+    """Run one command line; returns the exit status."""
     return main(shlex.split(line))
 
 
-def asked(line, capsys):
-    """What is printed where a user asks for it, as by --help."""
+def printed_on_exit(line, capsys):
+    """Output of a command line that ends argparse with status 0, such as --help."""
     with pytest.raises(SystemExit) as stop:
         run(line)
     assert stop.value.code == 0
@@ -36,9 +36,9 @@ def asked(line, capsys):
 
 
 def example(command, capsys):
-    """The example that --help gives, as arguments."""
-    said = asked(f"{command} --help", capsys)
-    return shlex.split(re.search(r"example:\n  jointlaw (.*)\n", said).group(1))
+    """Arguments of the example in the help of a command."""
+    text = printed_on_exit(f"{command} --help", capsys)
+    return shlex.split(re.search(r"example:\n  jointlaw (.*)\n", text).group(1))
 
 
 def test_shear_example_runs(tmp_path, capsys):
@@ -47,7 +47,7 @@ def test_shear_example_runs(tmp_path, capsys):
     names = {"law.toml", "summary.json", "shear.csv", "shear.png"}
     assert {path.name for path in out.iterdir()} == names
     # the contacts are kept: friction still rises at both turning points
-    assert "no peak: largest friction angle" in capsys.readouterr().out
+    assert "largest friction angle (no peak): " in capsys.readouterr().out
     table = np.genfromtxt(out / "shear.csv", delimiter=",", names=True)
     summary = json.loads((out / "summary.json").read_text(), parse_constant=pytest.fail)
     assert len(table) == summary["result"]["rows"] == 401
@@ -61,19 +61,19 @@ def test_presets_are_listed_and_start_a_file(tmp_path, capsys):
     assert main(["presets"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == jl.presets.names()
-    command, name, _, mine = example("presets", capsys)
+    command, name, _, file = example("presets", capsys)
     assert main([command, name]) == 0
-    (tmp_path / mine).write_text(capsys.readouterr().out)
-    assert main(["shear", mine, "--to", "1um", "--steps", "5", "--out", "o"]) == 0
+    (tmp_path / file).write_text(capsys.readouterr().out)
+    assert main(["shear", file, "--to", "1um", "--steps", "5", "--out", "o"]) == 0
     assert jl.JointLaw.from_toml(tmp_path / "o" / "law.toml") == jl.presets.load(name)
 
 
 def test_every_command_has_an_example_and_there_is_a_version(capsys):
-    commands = re.findall(r"^    (\w+) ", asked("--help", capsys), re.MULTILINE)
+    commands = re.findall(r"^    (\w+) ", printed_on_exit("--help", capsys), re.MULTILINE)
     assert commands == [command.name for command in COMMANDS]
-    for typed in [*commands, *(f"export {host}" for host in START)]:
-        assert example(typed, capsys)[: typed.count(" ") + 1] == typed.split()
-    assert asked("--version", capsys).endswith(f"{jl.__version__}\n")
+    for name in [*commands, *(f"export {host}" for host in RUN_COMMANDS)]:
+        assert example(name, capsys)[: name.count(" ") + 1] == name.split()
+    assert printed_on_exit("--version", capsys).endswith(f"{jl.__version__}\n")
 
 
 def test_all_options_of_shear(tmp_path):
@@ -83,8 +83,8 @@ def test_all_options_of_shear(tmp_path):
     ) == 0  # fmt: skip
     table = np.genfromtxt(tmp_path / "a" / "b" / "shear.csv", delimiter=",", names=True)
     assert table["shear_3_m"][10] == pytest.approx(-0.25e-6)
-    asked = 5e6 + 5e12 * (table["closure_m"][0] - table["closure_m"])
-    np.testing.assert_allclose(table["F1_Pa"], asked, rtol=1e-8)
+    normal_stress = 5e6 + 5e12 * (table["closure_m"][0] - table["closure_m"])
+    np.testing.assert_allclose(table["F1_Pa"], normal_stress, rtol=1e-8)
     written = jl.JointLaw.from_toml(tmp_path / "a" / "b" / "law.toml")
     assert written.resolution == jl.Resolution(3, 3, 2)  # "fast"
 
@@ -93,22 +93,22 @@ def test_options_of_closure(tmp_path):
     """Two cycles, in laboratory units."""
     line = "closure linear-a3 --normal-stress 1MPa,2MPa --steps 4 --units mm,MPa"
     assert run(f"{line} --format svg --out o") == 0
-    lab = np.genfromtxt(tmp_path / "o" / "closure.csv", delimiter=",", names=True)
-    assert lab["F1_MPa"][[4, 12]] == pytest.approx([1.0, 2.0], rel=1e-9)
+    table = np.genfromtxt(tmp_path / "o" / "closure.csv", delimiter=",", names=True)
+    assert table["F1_MPa"][[4, 12]] == pytest.approx([1.0, 2.0], rel=1e-9)
     law = jl.presets.load("linear-a3")
-    assert lab["closure_mm"][12] == pytest.approx(1e3 * law.closure(2e6), rel=1e-9)
+    assert table["closure_mm"][12] == pytest.approx(1e3 * law.closure(2e6), rel=1e-9)
     assert (tmp_path / "o" / "closure.svg").read_text().startswith("<?xml")
 
 
-@pytest.mark.parametrize("host", START)
-def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, capsys):
+@pytest.mark.parametrize("host", RUN_COMMANDS)
+def test_export_writes_the_files_of_a_host_and_prints_the_next_command(host, tmp_path, capsys):
     assert run(f"export {host} linear-a3 --resolution fast --out o") == 0
-    assert capsys.readouterr().out.endswith(f"\nrun: cd o && {START[host]}\n")
-    kept = {path.name for path in (resources.files(hosts) / host).rglob("*") if path.is_file()}
+    assert capsys.readouterr().out.endswith(f"\nrun: cd o && {RUN_COMMANDS[host]}\n")
+    sources = {path.name for path in (resources.files(hosts) / host).rglob("*") if path.is_file()}
     written = {path.name for path in (tmp_path / "o").iterdir()}
-    typed = [word.removeprefix("./") for word in START[host].split()]
-    assert {word for word in typed if word in kept} <= written
-    assert written & kept
+    words = [word.removeprefix("./") for word in RUN_COMMANDS[host].split()]
+    assert {word for word in words if word in sources} <= written
+    assert written & sources
     assert any("linear_a3" in name for name in written) or "law.toml" in written
     for path in (tmp_path / "o").iterdir():
         text = path.read_bytes().decode(errors="ignore")
@@ -132,14 +132,44 @@ def test_a_name_of_tables_is_an_identifier_of_c(text, name):
     require_name(name)
 
 
+def test_without_a_command_the_help_is_printed(capsys):
+    """The same for a command whose hosts are commands of their own."""
+    for words in ([], ["export"]):
+        assert main(words) == 0
+        printed = capsys.readouterr().out
+        assert printed == printed_on_exit(shlex.join([*words, "--help"]), capsys)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "shear linear-a3 --to 1um --steps 5",
+        "closure linear-a3 --steps 3",
+        "field --jrc 10 --jcs 100MPa --length 0.1m --normal-stress 1MPa --normal-stiffness 30GPa/m",
+        "fit loop.csv --set alpha=3.8",
+    ],
+)
+@pytest.mark.usefixtures("cycle")
+def test_json_prints_the_summary(line, tmp_path, capsys):
+    """Standard output is the summary alone, as the file holds it."""
+    assert run(f"{line} --json --out o") == 0
+    assert json.loads(capsys.readouterr().out) == summary_of(tmp_path / "o")
+
+
+def test_json_of_presets(capsys):
+    assert run("presets --json") == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert listed == {name: jl.presets.about(name) for name in jl.presets.names()}
+
+
 def test_as_a_module(tmp_path):
     """An exit status and no progress bar in a pipe; a refusal without a traceback."""
     command = shlex.split(f"{sys.executable} -m jointlaw shear biegel-smooth --to 1um --steps 5")
-    for words, status, told in (("--out o", 0, ""), ("--out o", 2, "o holds another run")):
-        done = subprocess.run([*command, *words.split()], capture_output=True, text=True)
-        assert done.returncode == status
-        assert told in done.stderr
-        assert len(done.stderr.splitlines()) == bool(told)
+    for status, message in ((0, ""), (2, "o holds another run")):
+        process = subprocess.run([*command, "--out", "o"], capture_output=True, text=True)
+        assert process.returncode == status
+        assert message in process.stderr
+        assert len(process.stderr.splitlines()) == bool(message)
     assert (tmp_path / "o" / "shear.png").is_file()
 
 
@@ -156,21 +186,22 @@ def summary_of(folder):
 
 
 def test_the_first_loading_is_fitted_and_the_rest_predicted(tmp_path, cycle, capsys):
-    """From zero stress, so the seating closure is known."""
+    """The test begins at zero stress, so the seating closure is known."""
     assert main(["fit", "loop.csv", "--set", "alpha=3.8", "--up-to", "5MPa", "--out", "o"]) == 0
     out = capsys.readouterr().out
     summary = summary_of(tmp_path / "o")
     assert (summary["version"], summary["parameters_SI"]["seating"]) == (2, 0.0)
     above = np.count_nonzero(cycle.F1[:13] > 5e6)
     assert f"Held out: {above} points" in out
-    assert f"off by {100 * summary['error_at_largest_stress']:+.1f} %" in out
+    error = 100 * summary["error_at_largest_stress"]
+    assert f"Error of the predicted stress: {error:+.1f} % at the largest" in out
     assert (tmp_path / "o" / "fit.png").read_bytes().startswith(b"\x89PNG")
     law = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
     assert law.heights.beta == summary["parameters_SI"]["beta"]
 
 
 def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, cycle, capsys, monkeypatch):
-    """With the law that gives all that is not fitted, the formation of contacts too."""
+    """The option --law sets all fixed parameters, the formation of contacts too."""
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     law = jl.presets.load("westerly-smooth")
     line = "fit loop.csv --set alpha=3.8 --law westerly-smooth --out o"
@@ -178,19 +209,19 @@ def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, cycle, caps
     captured = capsys.readouterr()
     assert "no picture: pictures need matplotlib" in captured.err
     assert "wrote law.toml, report.md, summary.json to o" in captured.out
-    found = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
-    assert (found.asperity, found.heights.overlap) == (law.asperity, law.heights.overlap)
-    assert found.heights.formation == law.heights.formation == "population"
+    fitted = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
+    assert (fitted.asperity, fitted.heights.overlap) == (law.asperity, law.heights.overlap)
+    assert fitted.heights.formation == law.heights.formation == "population"
 
 
-def test_no_friction_angle_of_a_surface_that_the_law_does_not_describe(tmp_path, capsys):
-    """Waves five times as long along the rows: at both sampling lengths."""
+def test_no_friction_angle_of_a_surface_that_the_law_does_not_represent(tmp_path, capsys):
+    """Waves five times as long along the rows: no angle at either sampling length."""
     z = 400e-6 * gaussian_filter(np.random.default_rng(0).standard_normal((400, 400)), (5, 25))
     np.save(tmp_path / "z.npy", z)
     assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
-    told = [line for line in capsys.readouterr().out.splitlines() if "not told" in line]
-    assert len(told) == 2
-    assert "°" not in "".join(told)
+    lines = [line for line in capsys.readouterr().out.splitlines() if "not estimated" in line]
+    assert len(lines) == 2
+    assert "°" not in "".join(lines)
 
 
 def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
@@ -199,8 +230,8 @@ def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
     np.save(tmp_path / "z.npy", 1e6 * z)
     assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "um", "--out", "o"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    told = {length: line for length in ("0.08", "0.16") for line in lines if f"| {length} " in line}
-    assert len(told) == 2
+    rows = {length: line for length in ("0.08", "0.16") for line in lines if f"| {length} " in line}
+    assert len(rows) == 2
     summary = summary_of(tmp_path / "o")
     assert summary["version"] == 2
     assert summary["parameters_SI"] == pytest.approx(jl.from_surface(z, 20e-6).parameters)
@@ -211,10 +242,10 @@ def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
     law = jl.JointLaw.from_toml(tmp_path / "p" / "law.toml")
     assert summary["parameters_SI"]["a"] == law.orientation.a
     assert summary["parameters_SI"]["asperity_density"] == law.asperity_density
-    found = summary_of(tmp_path / "p")["result"]
+    result = summary_of(tmp_path / "p")["result"]
     # the report's joint moves along the rows alone, in the same nodes: 0.1 degrees are rounding
-    angle = float(told["0.08"].split("|")[3].strip("° "))
-    assert found["peak_friction_angle_deg"] == pytest.approx(angle, abs=0.6)
+    angle = float(rows["0.08"].split("|")[3].strip("° "))
+    assert result["peak_friction_angle_deg"] == pytest.approx(angle, abs=0.6)
 
 
 @pytest.mark.parametrize(
@@ -254,10 +285,11 @@ PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0, "k": 1e3, "M": 
     ],
 )
 def test_every_row_of_the_tables_of_units(row, unit):
-    """By the parts of its name: kN/m2 is a thousand newtons on a square metre."""
-    plain = re.sub("[µμ]", "u", row.replace("²", "2"))
-    prefix, of_area = re.fullmatch("(.?)(?:m2|m|N|Pa)(?:/(.?)m2)?", plain).groups(default="")
-    exact = PREFIXES[prefix] ** (2 if unit == "m2" else 1) / PREFIXES[of_area] ** 2
+    """Against the parts of its name: kN/m2 is a thousand newtons per square metre."""
+    ascii_row = re.sub("[µμ]", "u", row.replace("²", "2"))
+    pattern = "(.?)(?:m2|m|N|Pa)(?:/(.?)m2)?"
+    prefix, area_prefix = re.fullmatch(pattern, ascii_row).groups(default="")
+    exact = PREFIXES[prefix] ** (2 if unit == "m2" else 1) / PREFIXES[area_prefix] ** 2
     assert units.parse(f"1{row}", unit) == pytest.approx(exact, rel=1e-15)
 
 
@@ -283,16 +315,16 @@ def test_every_unit_has_a_common_unit():
         *(("x", unit) for unit in units.COMMON),
     ],
 )
-def test_what_is_no_quantity(text, unit):
+def test_invalid_quantities(text, unit):
     with pytest.raises(ValueError, match=f"is not a quantity in {unit}; write") as error:
         units.parse(text, unit)
     assert repr(text) in str(error.value)
-    assert units.parse(str(error.value).rsplit(" ", 1)[-1], unit) > 0  # the example that it gives
+    assert units.parse(str(error.value).rsplit(" ", 1)[-1], unit) > 0  # its example
 
 
-def test_what_a_person_types_has_a_unit():
+def test_options_need_a_unit():
     assert units.parse_option("0", "Pa") == 0.0
     assert units.parse_option("5MPa", "Pa", positive=True) == 5e6
-    for text, told in (("5", "write for example 5MPa"), ("0", "> 0 Pa"), ("1e400Pa", "finite")):
-        with pytest.raises(ValueError, match=told):
+    for text, message in (("5", "write for example 5MPa"), ("0", "> 0 Pa"), ("1e400Pa", "finite")):
+        with pytest.raises(ValueError, match=message):
             units.parse_option(text, "Pa", positive=True)

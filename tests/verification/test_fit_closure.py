@@ -258,7 +258,8 @@ def test_the_command_says_what_it_assumed(tmp_path, capsys):
     values = "--jrc 10 --jcs 100MPa --length 10cm --normal-stress 1MPa --normal-stiffness 30GPa/m"
     assert main(f"field {values} --out {tmp_path}".split()) == 0
     printed = capsys.readouterr().out
-    assert "angle 50.0 deg at a shear displacement of 0.914 mm (Barton: 0.914)" in printed
-    assert "dilation angle 16.6 deg (Barton: 10.0)" in printed
+    assert "peak friction angle 50.0 deg (50.0)" in printed
+    assert "shear displacement at the peak 0.914 mm (0.914)" in printed
+    assert "largest dilation angle 16.6 deg (10.0)" in printed
     assert "Assumed (not constrained by field values)" in printed
     assert jl.JointLaw.from_toml(tmp_path / "law.toml").asperity.mu == pytest.approx(3**-0.5)

@@ -67,7 +67,7 @@ autodoc_typehints = "signature"
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Index", "Out")}
 python_use_unqualified_type_names = True
 
-logging.getLogger("skfem").setLevel(logging.WARNING)  # it tells every step that it takes
+logging.getLogger("skfem").setLevel(logging.WARNING)  # it logs every assembly step
 
 ORDER = (
     "first_curve", "closure_cycle", "direct_shear", "strength_envelope",
@@ -85,14 +85,14 @@ FIGURES = sorted(path.name for path in HERE.glob("paper/plot_*.py"))
 sphinx_gallery_conf = {
     "examples_dirs": ["gallery", "paper"],
     "gallery_dirs": ["examples", "figures"],
-    "ignore_pattern": "^_",  # what scripts share
+    "ignore_pattern": "^_",  # modules that several scripts import
     "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER] + FIGURES),
     "reset_modules": ("matplotlib", set_style),
     "remove_config_comments": True,
-    "capture_repr": (),  # what is printed, not what a last line returns
+    "capture_repr": (),  # show printed output, not the value of the last expression
     "download_all_examples": False,
     "show_memory": False,
-    "thumbnail_size": (640, 448),  # pixels: twice what is shown
+    "thumbnail_size": (640, 448),  # pixels: twice the displayed size
     "write_computation_times": False,
     "min_reported_time": 5,
     "show_signature": False,

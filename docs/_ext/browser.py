@@ -1,4 +1,4 @@
-"""The page "A joint in your browser": the script that it loads."""
+"""The script of the page docs/browser.md."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from jointlaw.hosts.browser import export
 
 
 def add(app, failed):
-    """Put it beside the pages of a site that was built."""
+    """Write the script into the static files of a site whose build succeeded."""
     if failed is None and app.builder.format == "html":
         script = Path(app.outdir) / "_static" / "joint.js"
         script.write_text(export.script(), encoding="utf-8")

@@ -1,7 +1,7 @@
 """Docstrings of this project, as reStructuredText.
 
-They are written to be read in a terminal, with parameters as `name: what it is`, under
-"Parameters" or in a paragraph of their own. napoleon would read what follows the colon as a type.
+They are written for a terminal, with parameters as `name: description`, under "Parameters" or in a
+paragraph of their own. napoleon would read the text after the colon as a type.
 Code in single backticks is set in conf.py (`default_role`).
 """
 
@@ -11,7 +11,7 @@ PARAMETER = re.compile(r"^(\w+(?:, \w+)*): ", re.MULTILINE)
 
 
 def fields(paragraph):
-    """A paragraph with its parameters as a field list, if it is `name: what it is` throughout."""
+    """Return a paragraph as a field list if it consists of `name: description` entries."""
     titled = re.match(r"Parameters\n-+\n", paragraph)
     text = paragraph[titled.end() :] if titled else paragraph
     starts = [line for line in text.splitlines() if not line.startswith(" ")]
@@ -21,11 +21,12 @@ def fields(paragraph):
 
 
 def process(app, what, name, obj, options, lines):
+    """Rewrite the lines of one docstring in place."""
     lines[:] = "\n\n".join(map(fields, "\n".join(lines).split("\n\n"))).split("\n")
 
 
 def unwrap(app, what, name, obj, options, signature, returns):
-    """Names of types instead of the wrapper that Sphinx puts round them in a union."""
+    """Return a signature with names of types in place of Sphinx' wrapper of types in a union."""
     pattern = r"TypeAliasForwardRef\('(\w+)'\)"
     return tuple(text and re.sub(pattern, r"\1", text) for text in (signature, returns))
 

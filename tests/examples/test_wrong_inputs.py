@@ -1,4 +1,4 @@
-"""Slips that people make with units, signs and columns: refused in one line, nothing is written."""
+"""Common mistakes with units, signs and columns: a one-line error message, no file is written."""
 
 import shlex
 from pathlib import Path
@@ -68,7 +68,7 @@ def _files(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("command", "message"),
     [
         ("jointlaw fit --shear no-unit.csv --out out", "column 'tau' gives no unit"),
         ("jointlaw fit --shear sign.csv --normal-stress 1MPa --out out", '"tau:-1MPa"'),
@@ -148,34 +148,34 @@ def _files(tmp_path):
         ("dem_demo nobodys --out out", "no scene 'nobodys': give a TOML file or one of arch"),
     ],
 )
-def test_a_slip_is_told_in_one_line(capsys, line, told):
-    program, *words = shlex.split(line)
+def test_error_message_has_one_line_and_names_the_remedy(capsys, command, message):
+    program, *words = shlex.split(command)
     assert {"jointlaw": jointlaw_main, "dem_demo": dem_demo.cli.main}[program](words) == 2
     (error,) = capsys.readouterr().err.splitlines()
     assert error.startswith(program)
-    assert told in error
+    assert message in error
     assert not Path("out").exists()
     assert Path("done/shear.csv").read_text() == "of an earlier run"
 
 
 @pytest.mark.parametrize(
-    ("line", "where"),
+    ("command", "function"),
     [
         ("fit grimsel_vd1_closure --out out", "fit.fit_curves"),
         ("shear linear-a2 --to 1um --out out", "laboratory.direct_shear"),
     ],
 )
-def test_ctrl_c_ends_a_command_in_one_line(line, where, capsys, monkeypatch):
-    monkeypatch.setattr(f"jointlaw.cli.{where}", Mock(side_effect=KeyboardInterrupt))
-    assert jointlaw_main(line.split()) == 130
+def test_ctrl_c_ends_a_command_with_one_line(command, function, capsys, monkeypatch):
+    monkeypatch.setattr(f"jointlaw.cli.{function}", Mock(side_effect=KeyboardInterrupt))
+    assert jointlaw_main(command.split()) == 130
     assert capsys.readouterr().err == (
-        f"jointlaw {line.split()[0]}: interrupted; no further files are written\n"
+        f"jointlaw {command.split()[0]}: interrupted; no further files are written\n"
     )
     assert not Path("out").exists()
 
 
-def test_force_replaces_a_run_whole():
-    """What the other run wrote is gone, what the user put there stays."""
+def test_force_replaces_all_files_of_the_earlier_run():
+    """Files of the earlier run are removed, files of the user stay."""
     assert jointlaw_main(shlex.split("closure linear-a3 --steps 3 --force --out done")) == 0
     assert Path("done/closure.csv").is_file()
     assert not Path("done/shear.csv").exists()

@@ -1,4 +1,4 @@
-"""Cutting a rock outline by joint sets: what is cut, what is kept, which edge is which joint."""
+"""Cutting a rock outline by joint sets: shapes of the blocks, and the joint set of each edge."""
 
 import numpy as np
 import pytest
@@ -13,23 +13,23 @@ STEEP = JointSet(-60.0, 1.6, "steep", persistence=0.7, scatter=0.3)
 FLAT = JointSet(36.0, 1.2, "flat", scatter=0.2, through=(2.0, 1.0))
 
 
-def test_a_regular_grid_is_exact():
-    """Ten by five blocks of 1 m by 2 m, whatever the order of the corners of the outline."""
+def test_two_orthogonal_sets_cut_a_regular_grid_exactly():
+    """Ten by five blocks of 1 m by 2 m, for both orders of the corners of the outline."""
     sets = [JointSet(0.0, 2.0, "a"), JointSet(90.0, 1.0, "b")]
     for outline in (SQUARE, SQUARE[::-1]):
         blocks, sets_of, joined, dropped = cut(outline, sets, seed=0, least_width=0.1)
         assert (len(blocks), joined, dropped) == (50, 0, [])
-        for block, of in zip(blocks, sets_of, strict=True):
+        for block, set_of_edge in zip(blocks, sets_of, strict=True):
             # Rounding of coordinates of size 10.
             assert np.ptp(block, axis=0) == pytest.approx([1.0, 2.0], abs=1e-13)
             on_outline = np.isclose(block, 0.0).any() or np.isclose(block, 10.0).any()
-            assert (of == -1).any() == on_outline
-            assert sorted(set(of[of >= 0].tolist())) == [0, 1]  # and no cut that is no joint
+            assert (set_of_edge == -1).any() == on_outline
+            assert sorted(set(set_of_edge[set_of_edge >= 0].tolist())) == [0, 1]  # no other cuts
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_blocks_are_convex_wide_enough_and_fill_the_rock(seed):
-    """Nothing is lost but what is reported, nothing overlaps; the toe bends inwards."""
+    """Only reported slivers are lost, and no blocks overlap; the outline has an inward corner."""
     blocks, _sets_of, _joined, dropped = cut(SLOPE, [FLAT, STEEP], seed, least_width=0.25)
     shapes = [Polygon(block) for block in blocks]
     assert all(check_convex(block) is None for block in blocks)
@@ -37,33 +37,37 @@ def test_blocks_are_convex_wide_enough_and_fill_the_rock(seed):
     assert lost < 0.05
     # Joining fills gaps of 1e-7 of the rock's size at most.
     assert sum(s.area for s in shapes) == pytest.approx(Polygon(SLOPE).area - lost, abs=1e-4)
-    for i, one in enumerate(shapes):
-        assert max((one.intersection(other).area for other in shapes[:i]), default=0) < 1e-5
+    for i, shape in enumerate(shapes):
+        overlaps = [shape.intersection(earlier).area for earlier in shapes[:i]]
+        assert max(overlaps, default=0) < 1e-5
     for block in blocks:
         edge = np.roll(block, -1, axis=0) - block
         normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
         assert np.ptp(block @ normal, axis=0).min() >= 0.25
 
 
-def test_persistence_is_the_share_of_length_that_is_a_joint():
-    """Vertical joints between 40 beds: 40 x 79 pieces of equal length, each there or not."""
+def test_persistence_is_the_jointed_fraction_of_the_trace_length():
+    """Vertical joints between 40 beds: 40 x 79 segments of equal length, each open or intact."""
     outline = SQUARE * [8.0, 4.0]
     sets = [JointSet(0.0, 1.0, "bed"), JointSet(90.0, 1.0, "cross", persistence=0.3)]
     blocks, _sets_of, _joined, _dropped = cut(outline, sets, seed=5, least_width=0.1)
-    share = (len(blocks) - 40) / (40 * 79)
-    assert share == pytest.approx(0.3, abs=3 * np.sqrt(0.3 * 0.7 / (40 * 79)))  # three sigma
+    jointed_fraction = (len(blocks) - 40) / (40 * 79)
+    assert jointed_fraction == pytest.approx(
+        0.3, abs=3 * np.sqrt(0.3 * 0.7 / (40 * 79))
+    )  # three sigma
     assert len(cut(outline, [sets[0]], 5, 0.1)[0]) == 40
 
 
 def test_joint_sets_cut_the_rock_around_its_openings():
-    """An opening that no joint meets is cut through at its corners; one at the rim is a notch."""
+    """An opening without a joint is cut at its corners; an opening at the rim is a notch."""
     holes = [
         [[1.2, 1.2], [1.8, 1.2], [1.5, 1.8]],
         [[9.0, 4.5], [11.0, 4.5], [11.0, 6.5], [9.0, 6.5]],
     ]
     sets = [JointSet(0.0, 5.0, "a"), JointSet(60.0, 5.0, "b", through=(5.0, 5.0))]
     blocks, _, _, dropped = cut(SQUARE, sets, 0, 0.01, [np.array(hole) for hole in holes])
-    shapes, openings = [Polygon(block) for block in blocks], [Polygon(hole) for hole in holes]
+    shapes = [Polygon(block) for block in blocks]
+    openings = [Polygon(hole) for hole in holes]
     assert all(check_convex(block) is None for block in blocks)
     assert max(s.intersection(hole).area for s in shapes for hole in openings) < 1e-6
     # 0.18 m2 and the part of 2 m2 inside the rock
@@ -76,31 +80,31 @@ def test_joint_sets_cut_the_rock_around_its_openings():
 
 
 def test_a_sliver_joins_its_neighbour_or_is_left_out():
-    """A joint 0.1 m from the side: a strip that only the bed next to it can take in."""
+    """A joint 0.1 m from the side makes a strip; only the bed next to it forms a convex union."""
     sets = [JointSet(90.0, 9.9, "a", through=(9.9, 0.0))]
     blocks, _, joined, _ = cut(SQUARE, sets, seed=0, least_width=0.2)
     assert (len(blocks), joined) == (1, 1)
     assert Polygon(blocks[0]).area == pytest.approx(100.0, abs=1e-9)
-    # Two beds meet a strip that is whole (by the seed): joined to either it would not be convex, so
-    # each takes its part, and the joint between them goes on through it.
+    # Two beds meet an uncut strip (by the seed): its union with either would not be convex, so each
+    # bed gets a part of it, and the joint between the beds is extended through the strip.
     beds = JointSet(0.0, 6.0, "b", through=(0.0, 5.0), persistence=0.5)
     blocks, sets_of, joined, dropped = cut(SQUARE, [*sets, beds], seed=6, least_width=0.2)
     assert (len(blocks), joined, dropped) == (2, 2, [])
     assert [Polygon(block).area for block in blocks] == pytest.approx([50.0, 50.0], abs=1e-9)
-    assert [(of == 1).sum() for of in sets_of] == [1, 1]
-    # Between an opening and the side of the rock nothing can take it in.
+    assert [(set_of_edge == 1).sum() for set_of_edge in sets_of] == [1, 1]
+    # Between an opening and the side of the rock it has no neighbour to join.
     hole = np.array([[1.0, 1.0], [9.95, 1.0], [9.95, 9.0], [1.0, 9.0]])
     cross = [JointSet(0.0, 5.0, "a", through=(0.0, 1.0)), JointSet(90.0, 20.0, "b")]
     blocks, _, _, dropped = cut(SQUARE, cross, 0, 0.2, [hole])
     assert sum(s.area for s in dropped) > 0
-    rest = Polygon(SQUARE).area - Polygon(hole).area - sum(s.area for s in dropped)
-    assert sum(Polygon(block).area for block in blocks) == pytest.approx(rest, abs=1e-9)
+    remaining = Polygon(SQUARE).area - Polygon(hole).area - sum(s.area for s in dropped)
+    assert sum(Polygon(block).area for block in blocks) == pytest.approx(remaining, abs=1e-9)
 
 
 def test_cuts_through_inward_corners_are_not_joints():
     """A notch in a corner of the rock, far from all joints: one cut, of both blocks beside it."""
     notched = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 7.0], [7.0, 7.0], [7.0, 10.0], [0.0, 10.0]])
     blocks, sets_of, _, _ = cut(notched, [JointSet(0.0, 4.0, "a", through=(0.0, 2.0))], 0, 0.1)
-    assert sum((of == CUT).sum() for of in sets_of) == 2
-    cuts = [block[of == CUT] for block, of in zip(blocks, sets_of, strict=True)]
+    assert sum((set_of_edge == CUT).sum() for set_of_edge in sets_of) == 2
+    cuts = [block[set_of_edge == CUT] for block, set_of_edge in zip(blocks, sets_of, strict=True)]
     assert np.concatenate(cuts)[:, 1] == pytest.approx([7.0, 7.0])

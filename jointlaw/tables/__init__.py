@@ -1,6 +1,6 @@
-"""Joint tables: the first loading of a law against closure, for hosts that take no law.
+"""Joint tables: the first loading of a law against closure, for hosts that cannot call a law.
 
-joint_table   the table: interpolation, the force that a host takes from it, its file, and its
-              error against the law; a file of its own, which hosts copy
-tabulate      from a law to its table
+joint_table   the table: interpolation, traction of a host that uses it, its file, and its error
+              against the law; it imports numpy alone, so that hosts copy it
+tabulate      computes the table of a law
 """

@@ -1,4 +1,4 @@
-"""The table against the law it was made from: where it must be exact, and what it drops."""
+"""Joint tables against their law: exact in first loading, stated errors elsewhere."""
 
 import math
 from dataclasses import fields, replace
@@ -19,51 +19,55 @@ def law():
 
 @pytest.fixture(scope="module")
 def table(law):
-    """Of the same law with a bond, which a table drops."""
+    """Table of the same law with a bond, which a table leaves out."""
     bonded = replace(law, bond=jl.Bond(1e10, 1e10, 1e6, 1e6))
     return jl.tabulate(bonded, shear_limit=2 * law.closure_range)
 
 
 def test_normal_stress_is_within_the_stated_tolerance(law, table):
-    """Between rows: 1e-3 of the value, or of 1e-4 of the largest where that is more. The tangent is
-    its slope: central differences of the law's own curve err by less than 1e-6."""
+    """Between rows the error is 1e-3 of the stress, or of 1e-4 of the largest stress.
+
+    The tangent is the slope: central differences of the law's curve have errors below 1e-6.
+    """
     u = np.random.default_rng(0).uniform(0, 1, 3000) ** 3 * law.closure_range
-    at, exact = table.lookup(u), law.normal_stress(u)
-    allowed = 1.05e-3 * np.maximum(exact, 1e-4 * exact.max())
-    assert (np.abs(at.normal_stress - exact) < allowed).all()
-    assert np.allclose(at.normal_stress, at.kn_secant * u, rtol=1e-15)
+    row = table.lookup(u)
+    exact = law.normal_stress(u)
+    tolerance = 1.05e-3 * np.maximum(exact, 1e-4 * exact.max())
+    assert (np.abs(row.normal_stress - exact) < tolerance).all()
+    assert np.allclose(row.normal_stress, row.kn_secant * u, rtol=1e-15)
     u = table.closure[5:-1]
     slope = (law.normal_stress(1.0001 * u) - law.normal_stress(0.9999 * u)) / (2e-4 * u)
     assert np.allclose(table.kn_tangent[5:-1], slope, rtol=1e-6)
 
 
-def test_shear_stiffness_is_that_of_a_small_shear(law, table):
-    """A probe of 1e-4 of the closure at azimuths between the columns; friction hardly acts yet."""
+def test_shear_stiffness_is_the_slope_at_small_shear(law, table):
+    """At azimuths between the columns, by a probe of 1e-4 of the closure, few sliders slip."""
     u = 0.3 * law.closure_range
     for azimuth in (0.1, 1.0, 2.5):
         joint = law.joint()
         joint.update([u, 0, 0])
         probe = 1e-4 * u * np.array([0, math.cos(azimuth), math.sin(azimuth)])
-        ahead, back = joint.trial(probe)[0], joint.trial(-probe)[0]
-        stiffness = (ahead - back) @ probe / (2 * probe @ probe)
+        forward, _ = joint.trial(probe)
+        backward, _ = joint.trial(-probe)
+        stiffness = (forward - backward) @ probe / (2 * probe @ probe)
         assert table.lookup(u, azimuth).shear_stiffness == pytest.approx(stiffness, rel=2e-3)
     assert table.metadata["azimuth_fit_error"] < 1e-6  # stiffness over azimuth is a matrix
 
 
-def test_friction_is_that_of_a_shear_test(law, table):
-    """Against `direct_shear` with twice the steps: peak within 0.5 % at three azimuths."""
+def test_friction_agrees_with_a_shear_test(law, table):
+    """`direct_shear` with twice the steps has the same peak within 0.5 % at three azimuths."""
     for azimuth in (0.0, math.pi / 3, math.pi / 2):
         u = 0.5 * law.closure_range
         record = jl.direct_shear(
             law.joint(), 2 * law.closure_range, normal=float(law.normal_stress(u)),
             azimuth=azimuth, steps=120,
         )  # fmt: skip
-        at = table.lookup(u, azimuth)
+        row = table.lookup(u, azimuth)
         peak = np.tan(np.radians(record.peak_friction_angle))
-        assert at.peak_friction == pytest.approx(peak, rel=5e-3)
-        assert at.mobilised_friction <= at.peak_friction
+        assert row.peak_friction == pytest.approx(peak, rel=5e-3)
+        assert row.mobilised_friction <= row.peak_friction
         rate = -np.diff(record.closure)[-1] / np.diff(record.shear)[-1]
-        assert at.dilation == pytest.approx(rate, rel=0.05)  # over the last, longer step
+        assert row.dilation == pytest.approx(rate, rel=0.05)  # over the last, longer step
 
 
 @pytest.mark.parametrize(
@@ -76,25 +80,25 @@ def test_friction_is_that_of_a_shear_test(law, table):
         ({"shear_limit": math.nan}, "shear_limit"),
     ],
 )
-def test_bad_options_are_named(law, options, words):
+def test_invalid_options_are_named(law, options, words):
     with pytest.raises(ValueError, match=words):
         jl.tabulate(law, **options)
 
 
-def test_the_file_keeps_every_digit_and_is_what_numpy_users_expect(table, tmp_path):
-    """Column names in the first line; secant and tangent under their own names."""
+def test_the_file_keeps_every_digit_and_is_read_by_genfromtxt(table, tmp_path):
+    """Column names are in the first line; secant and tangent have names of their own."""
     table.save(tmp_path / "joint.txt")
     assert [path.name for path in tmp_path.iterdir()] == ["joint.txt"]
-    back = jl.load_table(tmp_path / "joint.txt")
+    loaded = jl.load_table(tmp_path / "joint.txt")
     for field in fields(table):
-        np.testing.assert_equal(getattr(back, field.name), getattr(table, field.name))
+        np.testing.assert_equal(getattr(loaded, field.name), getattr(table, field.name))
     data = np.genfromtxt(tmp_path / "joint.txt", names=True)
     assert data.dtype.names[:7] == ("un", "sn", "kn_secant", "kn_tangent", "mu", "kt_000", "kt_015")
     assert np.array_equal(data["kt_090"], table.shear_stiffness[:, 6])
 
 
 def test_a_table_of_version_1_is_read():
-    """Of `linear-a3`; the law in its metadata tells what it must hold."""
+    """A table of `linear-a3`, compared with the law in its metadata."""
     table = jl.load_table(SPECIMEN)
     law = jl.JointLaw.from_text(table.metadata["law"])
     u = np.linspace(0, law.closure_range, 9)[1:]
@@ -111,8 +115,9 @@ def test_a_table_of_version_1_is_read():
         ("joint.txt", "_060 ", "_050 ", "azimuths be three or more, evenly spaced"),
     ],
 )
-def test_a_file_that_is_no_table_is_refused_by_name(tmp_path, name, old, new, words):
-    path, text = tmp_path / name, SPECIMEN.read_text()
+def test_an_invalid_table_file_is_refused_by_name(tmp_path, name, old, new, words):
+    path = tmp_path / name
+    text = SPECIMEN.read_text()
     if old is not None:
         assert old in text
         path.write_text(text.replace(old, new))
@@ -120,25 +125,25 @@ def test_a_file_that_is_no_table_is_refused_by_name(tmp_path, name, old, new, wo
         jl.load_table(path)
 
 
-def test_report_says_what_is_dropped(law, table):
-    """Pure closure is kept; unloading, coupling and reversal are dropped, and show as errors.
+def test_report_states_the_errors_of_a_table(law, table):
+    """Pure closure is exact; unloading, coupling and reversal show as errors.
 
-    A bond is dropped too, and that is said: in all these tests the law has none.
+    The metadata name the bond that is left out. The law of this report has none.
     """
     assert table.metadata["bond"] == "left out: this is the joint without its bond"
     report = table.report(law)
     assert report["closure"].largest < 1.1e-3
     assert report["closure, unloading"].normal > 0.05  # hysteresis
-    assert report["shear at 0 deg, closure held"].normal > 0.05  # shear changes normal stress
-    assert report["shear at 45 deg, closure held"].across > 0.05  # off-diagonal terms
+    assert report["shear at 0 deg, constant closure"].normal > 0.05  # shear changes normal stress
+    assert report["shear at 45 deg, constant closure"].across > 0.05  # off-diagonal terms
     assert report["shear and reversal"].along > 0.2  # path dependence
     assert [line[:34].strip() for line in str(report).splitlines()] == ["path", *report]
 
 
-def test_follow_is_the_elastic_frictional_law_written_out(table):
-    """Point by point from `lookup`, with matrices: closure, shear, reversal, opening, re-contact.
+def test_follow_agrees_with_an_elastic_frictional_law_written_with_matrices(table):
+    """Closure, shear, reversal, opening, renewed contact; values of each point from `lookup`.
 
-    Rounding of some 400 steps: 1e-12 of the peak.
+    The difference is the rounding of some 400 steps, 1e-12 of the peak.
     """
     end = table.closure[-1]
     corners = end * np.array([
@@ -146,31 +151,37 @@ def test_follow_is_the_elastic_frictional_law_written_out(table):
         [0.6, 0.1, 0.3], [1.3, 0.4, 0.3],
     ])  # fmt: skip
     path = np.array([np.interp(np.arange(361), 60 * np.arange(7), c) for c in corners.T]).T
-    f, here, old = np.zeros(2), np.zeros(3), np.zeros((2, 2))
+    f = np.zeros(2)
+    previous_point = np.zeros(3)
+    previous_K = np.zeros((2, 2))
     exact = np.zeros_like(path)
     for k, point in enumerate(path):
         at_0, at_45, at_90 = table.lookup(point[0], np.radians([0, 45, 90])).shear_stiffness
         K23 = at_45 - (at_0 + at_90) / 2
         K = np.array([[at_0, K23], [K23, at_90]])
-        if np.trace(K) < np.trace(old):
-            f = K @ np.linalg.solve(old, f)
-        f = f + K @ (point - here)[1:]
-        at = table.lookup(point[0], np.arctan2(f[1], f[0]))
-        if np.hypot(*f) > at.peak_friction * at.normal_stress:
-            f = f / np.hypot(*f) * at.peak_friction * at.normal_stress
-        exact[k], here, old = (at.normal_stress, *f), point, K
+        if np.trace(K) < np.trace(previous_K):
+            f = K @ np.linalg.solve(previous_K, f)
+        f = f + K @ (point - previous_point)[1:]
+        row = table.lookup(point[0], np.arctan2(f[1], f[0]))
+        limit = row.peak_friction * row.normal_stress
+        if np.hypot(*f) > limit:
+            f = f / np.hypot(*f) * limit
+        exact[k] = (row.normal_stress, *f)
+        previous_point = point
+        previous_K = K
     assert np.abs(exact[:, 1:]).max() > 0.1 * exact.max()
     assert np.abs(table.follow(path) - exact).max() < 1e-12 * exact.max()
 
 
 def test_the_shear_traction_turns_with_the_contact(table):
-    """The traction before a step by the whole spin, what the step adds by half of it."""
-    closure, spin = table.closure[-1:] / 2, np.array([0.3])
-    K22, K33, K23 = K = table.shear_matrix(*table.at(closure)[:2])
-    turn, half = (np.exp(1j * part) for part in (spin, spin / 2))
-    size = 0.01 * table.lookup(closure).normal_stress  # far from friction
-    f, d = size * np.array([[0.6], [0.8]]), size / K22 * np.array([[0.0], [0.5], [-0.2]])
-    found, _ = table.step(f, K, d, closure, spin)
-    added = K22 * d[1] + K23 * d[2] + 1j * (K23 * d[1] + K33 * d[2])
-    exact = turn * (f[0] + 1j * f[1]) + half * added
-    np.testing.assert_allclose(found[1] + 1j * found[2], exact, rtol=1e-12)
+    """The traction before a step turns by the whole spin, the new traction by half of it."""
+    closure = table.closure[-1:] / 2
+    spin = np.array([0.3])
+    K22, K33, K23 = K = table.shear_matrix(*table.locate(closure)[:2])
+    size = 0.01 * table.lookup(closure).normal_stress  # far below the friction limit
+    f = size * np.array([[0.6], [0.8]])
+    d = size / K22 * np.array([[0.0], [0.5], [-0.2]])
+    F, _ = table.step(f, K, d, closure, spin)
+    increment = K22 * d[1] + K23 * d[2] + 1j * (K23 * d[1] + K33 * d[2])
+    exact = np.exp(1j * spin) * (f[0] + 1j * f[1]) + np.exp(0.5j * spin) * increment
+    np.testing.assert_allclose(F[1] + 1j * F[2], exact, rtol=1e-12)

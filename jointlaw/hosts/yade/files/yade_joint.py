@@ -64,7 +64,7 @@ class TableLaw:
 
     def add(self, closure, bonded):
         """Contacts that came: unsheared joints at this closure (m)."""
-        row, w, _ = self.table.at(closure)
+        row, w, _ = self.table.locate(closure)
         self.f = np.concatenate([self.f, np.zeros((2, len(closure)))], axis=1)
         self.K = np.concatenate([self.K, self.table.shear_matrix(row, w)], axis=1)
 

@@ -203,6 +203,12 @@ def test_what_a_page_names_exists(page):
     assert set(commands) <= {command.name for command in COMMANDS}
 
 
+def test_every_picture_is_on_a_page():
+    pictures = {path.name for path in (ROOT / "docs" / "pictures").iterdir()}
+    shown = {name for page in PAGES for name in re.findall(r"pictures/([\w.-]+)", text(page))}
+    assert pictures == shown
+
+
 @pytest.mark.parametrize("one", [one for one in fields(Run) if one.default not in (MISSING, None)])
 def test_the_page_gives_the_default_of_each_key_of_a_run(one):
     keys = text("docs/blocks.md").partition("## The keys of")[2]

@@ -1,12 +1,13 @@
-"""Make the tables and pictures of README and docs anew: `python docs/make_all.py [TASK ...]`.
+"""Make tables, figures and pictures of README and docs anew: `python docs/make_all.py [PART ...]`.
 
-A task is a table that a command prints, and takes its place between the marks of that name in a
-page; or a picture of docs/pictures that a command draws; or a shipped scene, whose ablation goes to
-docs/data. `--list` prints all of them: key, page or file that the command writes, command. Tasks of
-which no time is kept run two at a time, on one thread each; those that measure times come last, one
-by one: let nothing else run beside them. Each prints what it took. Tables of YADE and LAMMPS need
-these installed. `timed` makes all that measure times, the tables of costs. A task that fails does
-not stop the others.
+A part is one command, which writes a table into a page, between the marks of the same name, or
+pictures into docs/pictures, or an ablation of a shipped scene into docs/data. All other output of
+the command is printed: it has the figures that a page quotes. `--list` prints all parts: name,
+pages or files, command. `timed` names all parts that measure times, the tables of costs.
+
+Without a name all parts are made. Parts that measure no time run two at a time, on one thread each;
+parts that measure times come last, one by one: let no other program run meanwhile. Some parts need
+an hour, others YADE, LAMMPS or CuPy. A part that fails does not stop the others.
 """
 
 import os
@@ -17,127 +18,219 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
 
-HERE = Path(__file__).parent
-# key: where it goes, and the command; the first table that it prints goes to a page
-TABLES = {
-    "intervals": ("validation.md", "docs/measure/intervals.py"),
-    "held-out-few": ("validation.md", "docs/measure/held_out.py"),
-    "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
-    "baselines": ("validation.md", "docs/measure/baselines.py"),
-    "small-loads": ("accuracy.md", "docs/measure/tolerance.py --small --laws 4 --seed 5"),
-}
-TIMED = {
-    "price-list": ("accuracy.md", "docs/measure/price_list.py"),
-    "native": ("native.md", "docs/measure/native.py"),
-    "joints": ("native.md", "docs/measure/native.py --joints"),
-    "blocks-price": ("blocks.md", "docs/measure/blocks.py"),
-    "yade": ("particles.md", "docs/measure/yade.py"),
-    "lammps": ("particles.md", "docs/measure/lammps.py FOLDER"),
-    "lammps-scale": ("particles.md", "docs/measure/lammps_scale.py FOLDER"),
-}
-# the file that a command writes into FOLDER becomes the picture
-PICTURES = {
-    "moving.gif": ("moving.gif", "docs/draw/moving.py FOLDER"),
-    **{
-        f"{name}.png": (f"{name}.png", "docs/draw/why.py FOLDER")
-        for name in ("three-laws", "along-across", "jrc", "strength-surface")
-    },
-    "axes.png": ("axes.png", "docs/draw/axes.py FOLDER"),
-    "shear.png": (
-        "shear.png",
+DOCS = Path(__file__).parent
+PAGE_LOCK = Lock()  # two parts may write to the same page
+
+
+@dataclass(frozen=True)
+class Part:
+    """A command, run in the root of the repository, and the places of its output.
+
+    command: after the name of Python; FOLDER stands for a temporary folder.
+    page: has the marks between which the first printed table goes.
+    pictures: name in docs/pictures: name of the file that the command writes into FOLDER.
+    quoted_in: pages that quote figures of the output.
+    """
+
+    command: str
+    page: str | None = None
+    pictures: dict[str, str] = field(default_factory=dict)
+    quoted_in: str = ""
+    is_timed: bool = False
+
+    @property
+    def places(self):
+        """Pages and files that have its output."""
+        page = [self.page] if self.page else []
+        pictures = [f"pictures/{name}" for name in self.pictures]
+        quoted_in = self.quoted_in.split()
+        return ", ".join(dict.fromkeys([*page, *pictures, *quoted_in]))
+
+
+PARTS = {
+    # accuracy.md
+    "named-resolutions": Part("docs/measure/resolutions.py named", quoted_in="accuracy.md"),
+    "tolerance": Part(
+        "docs/measure/random_laws.py tolerance --laws 3 --seed 31 --plane", quoted_in="accuracy.md"
+    ),
+    "tilt-friction": Part("docs/measure/resolutions.py tilt-friction", quoted_in="accuracy.md"),
+    "small-loads": Part(
+        "docs/measure/random_laws.py small-loads --laws 4 --seed 5", page="accuracy.md"
+    ),
+    "one-plane": Part("docs/measure/resolutions.py one-plane", quoted_in="accuracy.md"),
+    "ablation-table": Part("docs/measure/blocks.py ablation-table", quoted_in="accuracy.md"),
+    # validation.md
+    "friction-angles": Part("docs/measure/random_laws.py angles", quoted_in="validation.md"),
+    "empirical-laws": Part("docs/measure/fits.py empirical-laws", page="validation.md"),
+    "extrapolation": Part("docs/measure/fits.py extrapolation", page="validation.md"),
+    "intervals": Part("docs/measure/fits.py intervals", page="validation.md"),
+    "peak-residual": Part("docs/measure/fits.py peak-and-residual", page="validation.md"),
+    "extremes": Part("docs/measure/test_figures.py extremes", quoted_in="validation.md"),
+    "exact-steps": Part("docs/measure/test_figures.py exact-steps", quoted_in="validation.md"),
+    # limits.md, theory-incremental.md
+    "forgetting": Part("docs/measure/test_figures.py forgetting", quoted_in="limits.md"),
+    "impacts": Part("docs/measure/test_figures.py impacts", quoted_in="limits.md"),
+    "angle-sum": Part("docs/measure/random_laws.py angle-sum", quoted_in="limits.md"),
+    "energy-gain": Part("docs/measure/energy_gain.py", quoted_in="limits.md theory-incremental.md"),
+    "energy-gain-of-one-law": Part(
+        "docs/measure/energy_gain.py --laws 1 --first 1138", quoted_in="limits.md"
+    ),
+    # blocks.md
+    "shaken-slab": Part("docs/measure/blocks.py shaken-slab", quoted_in="blocks.md"),
+    # pictures
+    "moving": Part("docs/draw/moving.py FOLDER", pictures={"moving.gif": "moving.gif"}),
+    "why": Part(
+        "docs/draw/why.py FOLDER",
+        pictures={
+            "three-laws.png": "three-laws.png",
+            "along-across.png": "along-across.png",
+            "jrc.png": "jrc.png",
+            "strength-surface.png": "strength-surface.png",
+        },
+        quoted_in="why.md",
+    ),
+    "axes": Part("docs/draw/axes.py FOLDER", pictures={"axes.png": "axes.png"}),
+    "shear": Part(
         "-m jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um "
         "--resolution fine --out FOLDER",
+        pictures={"shear.png": "shear.png"},
     ),
-    "tilt.png": ("tilt.png", "docs/draw/tilt.py FOLDER"),
-    "slope.png": ("final.png", "-m dem_demo slope --out FOLDER"),
-    "slope.gif": ("motion.gif", "-m dem_demo slope --out FOLDER"),
-    "shear-box.png": ("curves.png", "-m dem_demo shear-box --out FOLDER"),
-    "strength.png": (
-        "failing-rough.png",
+    "tilt": Part("docs/draw/tilt.py FOLDER", pictures={"tilt.png": "tilt.png"}),
+    "slope": Part(
+        "-m dem_demo slope --out FOLDER",
+        pictures={"slope.png": "final.png", "slope.gif": "motion.gif"},
+    ),
+    "shear-box": Part(
+        "-m dem_demo shear-box --out FOLDER", pictures={"shear-box.png": "curves.png"}
+    ),
+    "strength": Part(
         "-m dem_demo strength-reduction slope --out FOLDER",
+        pictures={"strength.png": "failing-rough.png"},
+        quoted_in="blocks.md",
     ),
-    "wet-slope.png": ("final.png", "-m dem_demo wet-slope --out FOLDER"),
-    "tunnel.png": ("final.png", "-m dem_demo tunnel --out FOLDER"),
-    "shaken-slope.png": ("shaken-slope.png", "docs/draw/shaken_slope.py FOLDER"),
-    "fit.png": ("fit.png", "-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER"),
+    "wet-slope": Part(
+        "-m dem_demo wet-slope --out FOLDER", pictures={"wet-slope.png": "final.png"}
+    ),
+    "tunnel": Part("-m dem_demo tunnel --out FOLDER", pictures={"tunnel.png": "final.png"}),
+    "shaken-slope": Part(
+        "docs/draw/shaken_slope.py FOLDER",
+        pictures={"shaken-slope.png": "shaken-slope.png"},
+        quoted_in="blocks.md",
+    ),
+    "fit": Part(
+        "-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER",
+        pictures={"fit.png": "fit.png"},
+    ),
+    # docs/data: the command writes there itself
+    **{
+        path.stem: Part(
+            f"docs/measure/blocks.py ablation {path.stem.removeprefix('ablation-')}",
+            quoted_in=f"data/{path.name}",
+        )
+        for path in sorted(DOCS.glob("data/ablation-*.csv"))
+    },
+    # costs
+    "cost-list": Part("docs/measure/resolutions.py cost-list", page="accuracy.md", is_timed=True),
+    "reduced-models": Part(
+        "docs/measure/resolutions.py reduced-models", quoted_in="accuracy.md", is_timed=True
+    ),
+    "native": Part("docs/measure/native.py updates", page="native.md", is_timed=True),
+    "batch-size": Part("docs/measure/native.py batch-size", page="native.md", is_timed=True),
+    "graphics": Part(
+        "docs/measure/native.py graphics FOLDER",
+        quoted_in="native.md",
+        is_timed=True,
+    ),
+    "blocks-cost": Part("docs/measure/blocks.py step-cost", page="blocks.md", is_timed=True),
+    "heap": Part("docs/measure/blocks.py heap FOLDER", quoted_in="blocks.md", is_timed=True),
+    "yade": Part("docs/measure/hosts.py yade", page="particles.md", is_timed=True),
+    "lammps": Part("docs/measure/hosts.py lammps FOLDER", page="particles.md", is_timed=True),
+    "lammps-scale": Part(
+        "docs/measure/hosts.py lammps-scale FOLDER", page="particles.md", is_timed=True
+    ),
 }
-SCENES = {  # the command writes to docs/data itself
-    scene: ("docs/data", f"docs/measure/ablations.py --scene {scene}")
-    for scene in sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv"))
-}
-TASKS = TABLES | PICTURES | SCENES | TIMED
-LOCK = Lock()  # of the pages: two tasks may fill the same one
 
 
-def make(key):
-    """Run the command of a task and store what it makes."""
-    place, command = TASKS[key]
+def make(name):
+    """Run the command of a part and store its output; returns the text that it printed."""
+    part = PARTS[name]
     with tempfile.TemporaryDirectory() as folder:
-        printed = run(command, folder, key)
-        if key in PICTURES:
-            shutil.copy(Path(folder) / place, HERE / "pictures" / key)
-        elif key not in SCENES:
-            fill(place, key, first_table(printed))
+        printed = run(part, folder)
+        for picture, file in part.pictures.items():
+            shutil.copy(Path(folder) / file, DOCS / "pictures" / picture)
+    if part.page:
+        write_table(part.page, name, first_table(printed))
+    return printed
 
 
-def run(command, folder, key):
-    """What it prints."""
-    words = command.replace("FOLDER", folder).split()
-    env = os.environ | ({} if key in TIMED else {"JOINTLAW_THREADS": "1"})
-    done = subprocess.run([sys.executable, *words], cwd=HERE.parent, env=env, text=True,
-                          capture_output=True)  # fmt: skip
-    if done.returncode:
-        raise RuntimeError(f"{command} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
-    return done.stdout
+def run(part, folder):
+    """Run the command of a part; returns the text that it prints."""
+    words = part.command.replace("FOLDER", folder).split()
+    threads = {} if part.is_timed else {"JOINTLAW_THREADS": "1"}
+    process = subprocess.run([sys.executable, *words], cwd=DOCS.parent, env=os.environ | threads,
+                             text=True, capture_output=True)  # fmt: skip
+    if process.returncode:
+        raise RuntimeError(
+            f"{part.command} ended with {process.returncode}:\n{process.stdout}{process.stderr}"
+        )
+    return process.stdout
 
 
 def first_table(text):
-    """What goes to the page."""
+    """The first table in a text."""
     table = re.search(r"^\|.*?(?=^[^|]|\Z)", text, re.DOTALL | re.MULTILINE)
     if table is None:
         raise ValueError(f"no table was printed: {text}")
     return table[0].strip()
 
 
-def fill(page, key, text):
-    """Put text between the marks `key` and `end of key` of the page."""
-    path = HERE / page
-    with LOCK:
+def write_table(page, name, table):
+    """Replace the text between the marks `name` and `end of name` of a page."""
+    path = DOCS / page
+    with PAGE_LOCK:
         old = path.read_text(encoding="utf-8")
-        before, found, rest = old.partition(f"<!-- {key} -->\n")
-        if not found:
-            raise ValueError(f"{page} has no place for {key}")
-        after = rest[rest.index(f"<!-- end of {key} -->") :]
-        path.write_text(f"{before}{found}{text}\n{after}", encoding="utf-8")
+        before, mark, rest = old.partition(f"<!-- {name} -->\n")
+        if not mark:
+            raise ValueError(f"{page} has no mark <!-- {name} -->")
+        after = rest[rest.index(f"<!-- end of {name} -->") :]
+        path.write_text(f"{before}{mark}{table}\n{after}", encoding="utf-8")
 
 
-def task(key):
-    """Whether it was done."""
-    begun, error = time.perf_counter(), None
+def succeeds(name):
+    """Make a part and print its output, or its error; returns whether it was made."""
+    start = time.perf_counter()
     try:
-        make(key)
-    except (RuntimeError, ValueError) as fault:
-        error = fault
-    print(f"{key}: {time.perf_counter() - begun:.0f} s", error or "", flush=True)
-    return error is None
+        text = make(name)
+        is_made = True
+    except (RuntimeError, ValueError, OSError) as error:
+        text = str(error)
+        is_made = False
+    print(f"== {name}, {time.perf_counter() - start:.0f} s\n{text}", flush=True)
+    return is_made
 
 
 def main():
     if "--list" in sys.argv:
-        for key, (place, command) in TASKS.items():
-            print(f"{key}\t{place}\t{command}")
+        for name, part in PARTS.items():
+            print(f"{name}\t{part.places}\t{part.command}")
         return
-    keys = TIMED if sys.argv[1:] == ["timed"] else sys.argv[1:] or TASKS
-    if unknown := set(keys).difference(TASKS):
-        sys.exit(f"no task {', '.join(sorted(unknown))}; --list prints all")
-    last = [key for key in keys if key in TIMED]
+    if "--help" in sys.argv or "-h" in sys.argv:
+        print(__doc__)
+        return
+    names = sys.argv[1:] or list(PARTS)
+    timed = [name for name, part in PARTS.items() if part.is_timed]
+    if "timed" in names:
+        names = list(dict.fromkeys([name for name in names if name != "timed"] + timed))
+    if unknown := set(names).difference(PARTS):
+        sys.exit(f"no part {', '.join(sorted(unknown))}; --list prints all")
     with ThreadPoolExecutor(2) as pool:  # each waits for a process of its own
-        done = list(pool.map(task, [key for key in keys if key not in last]))
-    done += [task(key) for key in last]
-    sys.exit(0 if all(done) else "not all tasks were done")
+        results = list(pool.map(succeeds, [name for name in names if name not in timed]))
+    results += [succeeds(name) for name in names if name in timed]
+    sys.exit(0 if all(results) else "not all parts were made")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,8 @@
-"""Time of one update in C, beside the compiled batch of Python, of the named resolutions.
+"""Time of one update in C, in batches of Python, and on a graphics processor (GPU).
 
-    python docs/measure/native.py              the first table of docs/native.md, three minutes
-    python docs/measure/native.py --cc clang   with another compiler
-    python docs/measure/native.py --joints     the second table: when states leave the cache
-
-Each figure is the least of many short rounds, taken in turn, in nanoseconds per joint and update.
-In the first table it is the time of one thread, so that other programs count little. C:
-`jlaw_update`, one joint at a time as in a pair loop; many: `jlaw_update_many`; both built with the
-flags of the exported Makefile. batch: `JointBatch.update` of all joints. F: traction alone, FC:
-with tangent. Steps are random around a closure of 1 um. The second table is by the clock.
+python docs/measure/native.py updates [--cc clang] [--rounds 60]
+python docs/measure/native.py batch-size [--rounds 60]
+python docs/measure/native.py graphics FOLDER [--preset westerly-rough] [--joints 1000000]
 """
 
 import ctypes
@@ -22,97 +16,126 @@ from itertools import cycle
 from pathlib import Path
 
 import numpy as np
-from tables import asked, least, table
+from common import ROOT, print_table, run_command, shortest_times
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
 from jointlaw.native.build import BUILT
 
-FLAGS = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
-         "-Wno-psabi"]  # fmt: skip
-PLACES = {"plane": 0.0, "space": None}
-MOST = 4000  # joints of a batch
-LOOP = (
-    f"#define MOST {MOST}\n"
+COMPILER_FLAGS = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno",
+                  "-fno-trapping-math", "-Wno-psabi"]  # fmt: skip
+PLANES = {"plane": 0.0, "space": None}
+BATCH_SIZE = 4000  # joints
+GPU_STEPS = 50
+COMPARED_JOINTS = 2000  # on the GPU and in Python; the other joints repeat their steps
+THREADS_PER_BLOCK = 128
+TIMING_SOURCE = (
+    f"#define BATCH_SIZE {BATCH_SIZE}\n"
     + """
 #define _POSIX_C_SOURCE 199309L
 #define JOINTLAW_IMPLEMENTATION
 #include "jointlaw.h"
 #include <time.h>
-static double now(void)
+static double thread_time(void)
 {
   struct timespec t;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return 1e9 * (double) t.tv_sec + (double) t.tv_nsec;
 }
-double loop(const jlaw_law *law, double *states, const double *d, long n, int tangent)
+double update_each(const jlaw_law *law, double *states, const double *d, long n, int tangent)
 {
   const int rows = jlaw_state_size(law), dim = jlaw_dim(law);
   double F[3], C[9];
   char message[JLAW_MESSAGE];
-  const double start = now();
+  const double start = thread_time();
   for (long i = 0; i < n; i++, states += rows, d += dim)
     if (jlaw_update(law, states, states, d, F, tangent ? C : NULL, message, sizeof message))
       return -1;
-  return (now() - start) / (double) n;
+  return (thread_time() - start) / (double) n;
 }
-double many(const jlaw_law *law, double *states, const double *d, long n, int tangent)
+double update_many(const jlaw_law *law, double *states, const double *d, long n, int tangent)
 {
-  static double F[3 * MOST], C[9 * MOST];
+  static double F[3 * BATCH_SIZE], C[9 * BATCH_SIZE];
   const size_t rows = (size_t) jlaw_state_size(law), count = (size_t) n;
-  const double start = now();
+  const double start = thread_time();
   if (jlaw_update_many(law, states, rows, d, F, tangent ? C : NULL, count) != count) return -1;
-  return (now() - start) / (double) n;
+  return (thread_time() - start) / (double) n;
 }
 """
 )
 
 
-def library(folder: Path, cc: str, *flags: str) -> ctypes.CDLL:
-    """The loop, compiled."""
-    source, target = folder / "loop.c", folder / f"{'-'.join(['loop', *flags])}.so"
-    source.write_text(LOOP)
-    command = [cc, "-std=c99", *FLAGS, *flags, "-shared", "-fPIC", f"-I{BUILT}"]
+def updates(cc="cc", rounds=60):
+    """Nanoseconds per joint and update in C and in a batch of Python, at named resolutions.
+
+    Each figure is the shortest of many rounds taken in turn, in processor time of one thread, so
+    that other programs count little. C: `jlaw_update`, one joint at a time as in a pair loop; many:
+    `jlaw_update_many`; both built with the flags of the exported Makefile. batch:
+    `JointBatch.update` of all joints. F: traction alone, FC: with tangent. Steps are random around
+    a closure of 1 um. Three minutes.
+    """
+    preset = jl.presets.load("westerly-smooth")
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        libraries = {
+            "C": timing_library(folder, cc),
+            "no ledger": timing_library(folder, cc, "-DJOINTLAW_NO_DISSIPATION"),
+            "many": timing_library(folder, cc, "-DJOINTLAW_MANY"),
+        }
+        for resolution in ("fast", "balanced", "fine"):
+            for place, plane in PLANES.items():
+                law = replace(preset, resolution=resolution, plane=plane)
+                times = update_times(law, libraries, folder / "law.jlaw", rounds)
+                sizes = [law.tables.sliders, 8 * law.state_size]
+                cells = [f"{ns:.0f}" for ns in times.values()]
+                rows.append([f"{resolution}, {place}", *sizes, *cells])
+    print_table(["resolution", "sliders", "bytes of state", *times], rows)
+
+
+def timing_library(folder, cc, *flags):
+    """Compile TIMING_SOURCE with these flags beside the usual ones, and load it."""
+    source = folder / "timing.c"
+    target = folder / f"{'-'.join(['timing', *flags])}.so"
+    source.write_text(TIMING_SOURCE)
+    command = [cc, "-std=c99", *COMPILER_FLAGS, *flags, "-shared", "-fPIC", f"-I{BUILT}"]
     subprocess.run([*command, str(source), "-o", str(target), "-lm"], check=True)
-    lib = ctypes.CDLL(str(target))
-    lib.jlaw_read.restype = ctypes.c_void_p
-    for function in (lib.loop, lib.many):
+    library = ctypes.CDLL(str(target))
+    library.jlaw_read.restype = ctypes.c_void_p
+    for function in (library.update_each, library.update_many):
         function.restype = ctypes.c_double
         function.argtypes = [*[ctypes.c_void_p] * 3, ctypes.c_long, ctypes.c_int]
-    return lib
+    return library
 
 
-def once(batch, steps, clock, threads, tangent=False):
-    """Nanoseconds per joint of one update."""
-    os.environ["JOINTLAW_THREADS"] = threads
-    before = clock()
-    batch.update(next(steps), tangent=tangent)
-    return 1e9 * (clock() - before) / len(batch)
-
-
-def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], file: Path, rounds: int):
-    """Least ns per update: column -> figure."""
-    rng, start = np.random.default_rng(1), np.zeros((MOST, law.dim))
-    d = rng.normal(0.0, 2e-8, (4, MOST, law.dim))
-    d[1::2] = -d[::2]
-    d = np.repeat(d, 2, axis=0)  # two steps each way
-    start[:, 0] = 1e-6
+def update_times(law, libraries, file, rounds):
+    """Shortest times (ns) per joint and update, by column of the table."""
+    rng = np.random.default_rng(1)
+    increments = rng.normal(0.0, 2e-8, (4, BATCH_SIZE, law.dim))
+    increments[1::2] = -increments[::2]
+    increments = np.repeat(increments, 2, axis=0)  # two steps forward, two back
+    closing = np.zeros((BATCH_SIZE, law.dim))
+    closing[:, 0] = 1e-6
     file.write_text(table_text(law))
 
     def in_c(name, tangent):
-        lib, steps, batch = libs[name], cycle(d), law.joints(MOST, ledger=False)
-        read = ctypes.c_void_p(lib.jlaw_read(str(file).encode(), None, 0))
-        batch.update(start, tangent=False)
-        loop, states = lib.many if name == "many" else lib.loop, batch.snapshot().values.copy()
-        return lambda: loop(read, states.ctypes.data, next(steps).ctypes.data, MOST, tangent)
+        library = libraries[name]
+        steps = cycle(increments)
+        batch = law.joints(BATCH_SIZE, ledger=False)
+        batch.update(closing, tangent=False)
+        states = batch.snapshot().values.copy()
+        c_law = ctypes.c_void_p(library.jlaw_read(str(file).encode(), None, 0))
+        update = library.update_many if name == "many" else library.update_each
+        return lambda: update(c_law, states.ctypes.data, next(steps).ctypes.data, BATCH_SIZE,
+                              tangent)  # fmt: skip
 
     def in_python(ledger, tangent):
-        batch = law.joints(MOST, ledger=ledger)
-        batch.update(start, tangent=False)
-        return partial(once, batch, cycle(d), time.thread_time, "1", tangent)
+        batch = law.joints(BATCH_SIZE, ledger=ledger)
+        batch.update(closing, tangent=False)
+        return partial(batch_time, batch, cycle(increments), time.thread_time, "1", tangent)
 
     cases = {
-        "C F, no ledger": in_c("bare", False),
+        "C F, no ledger": in_c("no ledger", False),
         "C F": in_c("C", False),
         "C FC": in_c("C", True),
         "many F": in_c("many", False),
@@ -121,51 +144,83 @@ def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], file: Path, rounds: 
         "batch F + ledger": in_python(True, False),
         "batch FC + ledger": in_python(True, True),
     }
-    return least(cases, rounds)
+    return shortest_times(cases, rounds)
 
 
-def beyond_the_cache(rounds):
-    """Rows: ns per joint of batches of 1e3 to 1e6 joints at "balanced", on one and two threads."""
+def batch_time(batch, steps, clock, threads, tangent=False):
+    """Nanoseconds per joint of one update."""
+    os.environ["JOINTLAW_THREADS"] = threads
+    start = clock()
+    batch.update(next(steps), tangent=tangent)
+    return 1e9 * (clock() - start) / len(batch)
+
+
+def batch_size(rounds=60):
+    """Nanoseconds per joint in batches of 1e3 to 1e6 joints, on one and two threads.
+
+    Wall-clock time at "balanced": how much it grows when the states exceed the cache.
+    """
     rows = []
     for n in (1000, 10_000, 100_000, 1_000_000):
         cells = []
-        for plane in PLACES.values():
+        for plane in PLANES.values():
             law = replace(jl.presets.load("westerly-smooth"), resolution="balanced", plane=plane)
-            batch, rng = law.joints(n, ledger=False), np.random.default_rng(1)
-            d = rng.normal(0.0, 2e-8, (n, law.dim))
-            batch.update(d + 1e-6 * np.eye(law.dim)[0], tangent=False)
-            cases = {threads: partial(once, batch, cycle([d, -d]), time.perf_counter, threads)
-                     for threads in "12"}  # fmt: skip
-            best = least(cases, max(rounds * 10_000 // n, 6))
+            batch = law.joints(n, ledger=False)
+            increment = np.random.default_rng(1).normal(0.0, 2e-8, (n, law.dim))
+            batch.update(increment + 1e-6 * np.eye(law.dim)[0], tangent=False)
+            steps = increment, -increment
+            cases = {
+                threads: partial(batch_time, batch, cycle(steps), time.perf_counter, threads)
+                for threads in "12"
+            }
+            times = shortest_times(cases, max(rounds * 10_000 // n, 6))
             cells += [f"{batch.bytes_per_joint * n / 1e6:.1f}"]
-            cells += [f"{ns:.0f}" for ns in best.values()]
+            cells += [f"{ns:.0f}" for ns in times.values()]
         rows.append([n, *cells])
-    return rows
+    head = [f"{place}: {column}" for place in PLANES for column in ("MB", "1 thread", "2 threads")]
+    print_table(["joints", *head], rows)
 
 
-def main() -> None:
-    """Print the table."""
-    options = asked(__doc__, cc="cc", joints=False, rounds=60)
-    if options.joints:
-        head = [f"{place}: {what}" for place in PLACES for what in ("MB", "1 thread", "2 threads")]
-        print(table(["joints", *head], beyond_the_cache(options.rounds)))
-        return
-    preset, rows = jl.presets.load("westerly-smooth"), []
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        libs = {"C": library(folder, options.cc),
-                "bare": library(folder, options.cc, "-DJOINTLAW_NO_DISSIPATION"),
-                "many": library(folder, options.cc, "-DJOINTLAW_MANY")}  # fmt: skip
-        for resolution in ("fast", "balanced", "fine"):
-            for where, plane in PLACES.items():
-                law = replace(preset, resolution=resolution, plane=plane)
-                best = measure(law, libs, folder / "law.jlaw", options.rounds)
-                sizes = [law.tables.sliders, 8 * law.state_size]
-                rows.append(
-                    [f"{resolution}, {where}", *sizes, *(f"{ns:.0f}" for ns in best.values())]
-                )
-    print(table(["resolution", "sliders", "bytes of state", *best], rows))
+def graphics(folder: Path, preset="westerly-rough", joints=1_000_000):
+    """The kernel of docs/native.md on a GPU, compared with the law in Python.
+
+    Exports the law into FOLDER and prints the largest difference of the traction in random steps
+    in space, over the largest traction, and the time per joint and step. Needs CuPy.
+    """
+    import cupy  # few machines have it
+    from cupyx.profiler import benchmark
+
+    law = jl.presets.load_any(preset)
+    batch = law.joints(COMPARED_JOINTS)
+    rng = np.random.default_rng(0)
+    increments = law.closure_range * rng.normal(0.0, 0.05, (GPU_STEPS, COMPARED_JOINTS, 3))
+    increments[0, :, 0] = law.closure_range * rng.uniform(0.3, 0.8, COMPARED_JOINTS)
+    jl.export_c(law, folder, "rock")
+    page = (ROOT / "docs" / "native.md").read_text(encoding="utf-8")
+    source = page.partition('RawModule(code=r"""\n')[2].partition('\n"""')[0]
+    module = cupy.RawModule(code=source, options=(f"-I{folder}", f"-DLAW={law.fingerprint}"))
+    advance = module.get_function("advance")
+    states = cupy.zeros((law.state_size, joints))
+    d = cupy.zeros((joints, 3))
+    F = cupy.zeros((joints, 3))
+    blocks = -(-joints // THREADS_PER_BLOCK)
+    call = (blocks,), (THREADS_PER_BLOCK,), (states, d, F, np.int32(joints))
+    gpu_tractions = []
+    python_tractions = []
+    for increment in increments:
+        d[:] = cupy.asarray(np.resize(increment, (joints, 3)))
+        advance(*call)
+        gpu_tractions.append(F[:COMPARED_JOINTS].get())
+        python_tractions.append(batch.update(increment, tangent=False)[0])
+    difference = np.abs(np.subtract(gpu_tractions, python_tractions)).max()
+    seconds = benchmark(advance, call, n_repeat=20).gpu_times.min()
+    device = cupy.cuda.runtime.getDeviceProperties(0)["name"].decode()
+    print(
+        f"{preset}, {joints} joints of {8 * law.state_size} bytes: traction within "
+        f"{difference / np.abs(python_tractions).max():.1e} of the largest in {GPU_STEPS} steps, "
+        f"{1e9 * seconds / joints:.2g} ns per joint and step on {device}"
+    )
 
 
 if __name__ == "__main__":
-    main()
+    run_command(__doc__, updates, batch_size, graphics)

@@ -14,7 +14,7 @@ from .slip import JointLaw
 from .suite import Suite, reference_resolution, scaled, standard_suite
 
 # How many times better than the tolerance: 30 random laws then kept it on all paths that were not
-# tried, the worst at 0.88 of it (docs/measure/tolerance.py)
+# tried, the worst at 0.88 of it (docs/measure/random_laws.py)
 MARGIN = 1.75
 EXCURSIONS = 128  # random paths beside the standard ones: what others ask shows in few of them
 _LARGEST = 4  # times the sliders of the usual reference: the finest that is tried

@@ -67,7 +67,7 @@ PRIORS: dict[str, tuple[float, float]] = {
     # Six decades around 10 um: says nothing within any one laboratory
     "beta": (1e-8, 1e-2),
     # N lam K sigma^(1+eta), see `quantity`: 0.63 GPa within a factor of 1000. A factor of 32 drove
-    # predictions beyond the data up by several per cent (docs/measure/held_out.py)
+    # predictions beyond the data up by several per cent (docs/measure/fits.py)
     "full_contact_stress": (6.3e5, 6.3e11),
     # Hertz (Eq. 34): shear modulus of rock 10 to 30 GPa, radius of curvature 40 um to 4 cm
     "K": (1e8, 1e10),

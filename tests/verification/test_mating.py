@@ -138,7 +138,7 @@ def test_slopes_wear_by_the_work_of_shear():
     np.testing.assert_allclose(y, expected, rtol=1e-12)
 
 
-PATHS, CYCLES = 34, 10  # of each of six kinds of law; docs/measure/gains.py searches on 60
+PATHS, CYCLES = 34, 10  # of each of six kinds of law; docs/measure/energy_gain.py searches on 60
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PATHS))]
 
 

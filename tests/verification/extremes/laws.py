@@ -1,7 +1,7 @@
 """Laws at the ends of what the parameters allow: one extreme at a time, in pairs, at random.
 
 The tests record their figures as properties of their report (`pytest --junitxml`), from which
-docs/measure/recorded.py makes tables; docs/validation.md has their figures. With JOINTLAW_FULL=1
+docs/measure/test_figures.py makes tables; docs/validation.md has the figures. With JOINTLAW_FULL=1
 in the environment they run at the full length of these tables.
 """
 

@@ -1,48 +1,54 @@
-/* elements.h: the elements beside the asperities of a joint, one joint at a time; symbols and order
- * of kernels/bond.py and kernels/coulomb.py. Its rows in a state are a vector in the plane of the
- * joint (Pa), or none, and last its damage, 0 to 1, or JLAW_SEPARATED_STATE. An element NAME of layout.h has
- * here
+/* elements.h: the elements of a joint other than its asperities: bond and Coulomb's law.
+ *
+ * They advance one joint at a time; symbols and order are those of kernels/bond.py and
+ * kernels/coulomb.py. The rows of an element in a state are a vector in the plane of the joint (Pa),
+ * if it has one, and its damage: 0 to 1, or JLAW_SEPARATED_STATE. For each element NAME of layout.h
+ * this file defines
  *
  *   jl_NAME_rows       number of its rows
- *   jl_NAME_step       a step, which returns the stored energy after it
- *   jl_NAME_stiffness  bound of |C| at this damage and closure; at 0 that of all states
+ *   jl_NAME_step       a step, which returns the stored energy at its end
+ *   jl_NAME_stiffness  upper bound of |C| at a damage and closure; at (0, 0): of all states
  */
 
 typedef struct {           /* an element of one joint in a step */
   double from[3], d[3];    /* displacement before the step, and its increment */
   double row[4];           /* its rows of the state, before and after the step */
-  double F[3], C[9], lost; /* what it adds: traction, tangent (3, 3), loss */
+  double F[3], C[9], loss; /* traction, tangent (3, 3), dissipated energy */
 } jl_element_step;
 
 /* ------------------------------------------------------------------------- the bond */
 
-/* 1 where opening and slip, squared, are the strength at this damage; p2: 1/half-axis, squared */
+/* Left side of the strength criterion, which equals 1 at the strength of this damage. opening2,
+ * slip2: squares; p2: squares of the reciprocal half-axes of the criterion */
 JL_INLINE double jl_bond_criterion(const jlaw_law *law, double opening2, double slip2,
                                    double damage, double p2[2])
 {
-  const double p = law->inverse_onset_opening
-                   - damage * (law->inverse_onset_opening - law->inverse_failure_opening);
-  const double q =
-      law->inverse_onset_slip - damage * (law->inverse_onset_slip - law->inverse_failure_slip);
+  const double onset[2] = {law->inverse_onset_opening, law->inverse_onset_slip};
+  const double failure[2] = {law->inverse_failure_opening, law->inverse_failure_slip};
+  const double p = onset[0] - damage * (onset[0] - failure[0]);
+  const double q = onset[1] - damage * (onset[1] - failure[1]);
   p2[0] = p * p, p2[1] = q * q;
   return opening2 * p2[0] + slip2 * p2[1];
 }
 
-/* Damage that opening and slip ask for: the smaller root of the quadratic; half the slope there */
+/* Damage at which the criterion equals 1, the smaller root of a quadratic equation. slope: half the
+ * derivative of the criterion with respect to -damage at the root */
 JL_INLINE double jl_bond_damage(const jlaw_law *law, double opening2, double slip2, double *slope)
 {
-  const double begin0 = law->inverse_onset_opening, soft0 = begin0 - law->inverse_failure_opening;
-  const double begin1 = law->inverse_onset_slip, soft1 = begin1 - law->inverse_failure_slip;
-  const double turn = begin1 * law->inverse_failure_opening - begin0 * law->inverse_failure_slip;
-  const double inside =
-      opening2 * (soft0 * soft0) + slip2 * (soft1 * soft1) - opening2 * slip2 * (turn * turn);
+  const double onset[2] = {law->inverse_onset_opening, law->inverse_onset_slip};
+  const double failure[2] = {law->inverse_failure_opening, law->inverse_failure_slip};
+  const double soft0 = onset[0] - failure[0], soft1 = onset[1] - failure[1];
+  const double determinant = onset[1] * failure[0] - onset[0] * failure[1];
+  const double discriminant = opening2 * (soft0 * soft0) + slip2 * (soft1 * soft1)
+                              - opening2 * slip2 * (determinant * determinant);
   double p2[2];
-  const double over = jl_bond_criterion(law, opening2, slip2, 0.0, p2) - 1.0;
-  *slope = sqrt(inside > 0.0 ? inside : 0.0);
-  if (!(over > 0.0)) return 0.0;
+  const double excess = jl_bond_criterion(law, opening2, slip2, 0.0, p2) - 1.0;
+  *slope = sqrt(discriminant > 0.0 ? discriminant : 0.0);
+  if (!(excess > 0.0)) return 0.0;
   if (!(jl_bond_criterion(law, opening2, slip2, 1.0, p2) < 1.0)) return 1.0;
-  const double found = over / (opening2 * (begin0 * soft0) + slip2 * (begin1 * soft1) + *slope);
-  return found < 1.0 ? found : 1.0;
+  const double root =
+      excess / (opening2 * (onset[0] * soft0) + slip2 * (onset[1] * soft1) + *slope);
+  return root < 1.0 ? root : 1.0;
 }
 
 JL_INLINE int jl_bonded_rows(const jlaw_law *law) { return law->bonded; }
@@ -56,33 +62,36 @@ JL_INLINE double jl_bonded_stiffness(const jlaw_law *law, double damage, double 
 
 JL_INLINE double jl_bonded_step(const jlaw_law *law, jl_element_step *b, int tangent)
 {
-  const double K[2] = {law->bond_normal_stiffness, law->bond_shear_stiffness}, old = b->row[0];
-  const double opened = b->from[0] + b->d[0];
-  const double u[3] = {opened < 0.0 ? opened : 0.0, b->from[1] + b->d[1], b->from[2] + b->d[2]};
+  const double K[2] = {law->bond_normal_stiffness, law->bond_shear_stiffness};
+  const double damage0 = b->row[0], closure = b->from[0] + b->d[0];
+  const double u[3] = {closure < 0.0 ? closure : 0.0, b->from[1] + b->d[1], b->from[2] + b->d[2]};
   const double opening2 = u[0] * u[0], slip2 = u[1] * u[1] + u[2] * u[2];
   const double psi = 0.5 * (K[0] * opening2 + K[1] * slip2);
   double p2[2], slope;
-  const double found = jl_bond_damage(law, opening2, slip2, &slope);
-  const double now = b->row[0] = found > old ? found : old;
-  const int softens = found > old && now < 1.0;
-  const double first = jl_bond_criterion(law, opening2, slip2, old, p2);
-  const double there = jl_bond_criterion(law, opening2, slip2, now, p2),
-               last = softens ? 1.0 : there;
-  b->lost = found > old ? (now - old) * psi / sqrt(first * last) : 0.0;
+  const double root = jl_bond_damage(law, opening2, slip2, &slope);
+  const int grows = root > damage0;
+  const double damage1 = grows ? root : damage0;
+  const int softens = grows && damage1 < 1.0;
+  /* dissipation: the damage times the geometric mean of psi at the start and end of its growth */
+  const double start = jl_bond_criterion(law, opening2, slip2, damage0, p2);
+  const double criterion = jl_bond_criterion(law, opening2, slip2, damage1, p2);
+  const double end = softens ? 1.0 : criterion;
+  b->row[0] = damage1;
+  b->loss = grows ? (damage1 - damage0) * psi / sqrt(start * end) : 0.0;
   for (int i = 0; i < 3; i++) {
-    b->F[i] = (1.0 - now) * K[i > 0] * u[i];
+    b->F[i] = (1.0 - damage1) * K[i > 0] * u[i];
     for (int j = 0; tangent && j < 3; j++)
       b->C[3 * i + j] = softens ? -(K[i > 0] * u[i]) * (u[j] * p2[j > 0] / slope) : 0.0;
-    if (tangent && (i || u[0] < 0.0)) b->C[4 * i] += (1.0 - now) * K[i > 0];
+    if (tangent && (i || u[0] < 0.0)) b->C[4 * i] += (1.0 - damage1) * K[i > 0];
   }
-  return (1.0 - now) * psi;
+  return (1.0 - damage1) * psi;
 }
 
 #include "coulomb.h"
 
-/* --------------------------------------------------------------------- all of a joint */
+/* --------------------------------------------------------- all elements of a joint */
 
-/* Rows of all elements; 0 where there are none beside the asperities, or in place of them */
+/* Rows of all elements of this file; 0 for a joint of asperities alone */
 JL_INLINE int jl_element_rows(const jlaw_law *law)
 {
 #define JL_ROWS(name) +(law->name ? jl_##name##_rows(law) : 0)
@@ -90,34 +99,35 @@ JL_INLINE int jl_element_rows(const jlaw_law *law)
 #undef JL_ROWS
 }
 
-/* Elements of a step from `from` by d, whose rows of the state begin at `row`. Adds what they bear
- * to F and C, where F is given; without it a state is only looked at. Returns their stored energy. */
+/* Advance the elements, whose rows of the state begin at `row`, from the displacement `from` by d.
+ * Adds their traction and tangent to F and C and their dissipated energy to the state; if F is NULL,
+ * nothing is written. Returns their stored energy. */
 JL_INLINE jl_joint_real jl_step_elements(const jlaw_law *law, jl_states n, int row,
                                          const jl_joint_real from[3], const jl_joint_real d[3],
                                          jl_joint_real F[3], jl_joint_real C[9], int tangent,
-                                         int ledger)
+                                         int track_dissipation)
 {
   const int dim = law->dim;
   jl_joint_real stored = jl_broadcast_joint(0.0);
   for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
-    double *own = JL_STATE_OF_LANE(n, l) + (size_t) row * n.stride,
-           *lost = JL_STATE_OF_LANE(n, l) + (size_t) dim * n.stride;
-#define JL_STEP_ELEMENT(name)                                                  \
-  if (law->name) {                                                             \
-    const int rows = jl_##name##_rows(law);                                    \
-    jl_element_step p; /* what a step does not write is not read */            \
-    for (int i = 0; i < 3; i++) {                                              \
-      p.from[i] = i < dim ? JL_JOINT(from[i], l) : 0.0;                        \
-      p.d[i] = i < dim ? JL_JOINT(d[i], l) : 0.0;                              \
-    }                                                                          \
-    for (int i = 0; i < rows; i++) p.row[i] = own[(size_t) i * n.stride];      \
-    JL_JOINT(stored, l) += jl_##name##_step(law, &p, tangent);                 \
-    for (int i = 0; F && i < rows; i++) own[(size_t) i * n.stride] = p.row[i]; \
-    for (int i = 0; F && i < dim; i++) JL_JOINT(F[i], l) += p.F[i];            \
-    for (int i = 0; F && tangent && i < dim * dim; i++)                        \
-      JL_JOINT(C[i], l) += p.C[i / dim * 3 + i % dim];                         \
-    if (F && ledger) *lost += p.lost;                                          \
-    own += (size_t) rows * n.stride;                                           \
+    double *rows = JL_STATE_OF_LANE(n, l) + (size_t) row * n.stride,
+           *dissipated = JL_STATE_OF_LANE(n, l) + (size_t) dim * n.stride;
+#define JL_STEP_ELEMENT(name)                                                    \
+  if (law->name) {                                                               \
+    const int count = jl_##name##_rows(law);                                     \
+    jl_element_step p; /* entries that a step does not write are not read */     \
+    for (int i = 0; i < 3; i++) {                                                \
+      p.from[i] = i < dim ? JL_JOINT(from[i], l) : 0.0;                          \
+      p.d[i] = i < dim ? JL_JOINT(d[i], l) : 0.0;                                \
+    }                                                                            \
+    for (int i = 0; i < count; i++) p.row[i] = rows[(size_t) i * n.stride];      \
+    JL_JOINT(stored, l) += jl_##name##_step(law, &p, tangent);                   \
+    for (int i = 0; F && i < count; i++) rows[(size_t) i * n.stride] = p.row[i]; \
+    for (int i = 0; F && i < dim; i++) JL_JOINT(F[i], l) += p.F[i];              \
+    for (int i = 0; F && tangent && i < dim * dim; i++)                          \
+      JL_JOINT(C[i], l) += p.C[i / dim * 3 + i % dim];                           \
+    if (F && track_dissipation) *dissipated += p.loss;                           \
+    rows += (size_t) count * n.stride;                                           \
   }
     JLAW_ELEMENTS(JL_STEP_ELEMENT)
 #undef JL_STEP_ELEMENT
@@ -125,7 +135,7 @@ JL_INLINE jl_joint_real jl_step_elements(const jlaw_law *law, jl_states n, int r
   return stored;
 }
 
-/* Bound of the |C| (Pa/m) that elements add in a state of these numbers; in all states if NULL */
+/* Upper bound of |C| (Pa/m) of the elements in the state s, or in all states if s is NULL */
 JL_INLINE double jl_elements_stiffness_bound(const jlaw_law *law, const double *s, int row,
                                              size_t stride)
 {

@@ -9,21 +9,22 @@
  *     double d[3] = {1e-7, 5e-8, 0.0}, F[3];
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) puts(message);
  *
- * Axes: 1 is the normal of the joint, 2 and 3 span it. d is the displacement in this step (m) of
- * one body into and along the other: closure first, then the jlaw_dim - 1 components of shear.
- * F is the traction (Pa), compression first: the force on the body that moves by +d is -area F.
- * C = dF/dd (Pa/m), row by row. Energies are per area (J/m2).
+ * Axes: 1 is the normal of the joint, 2 and 3 span it. d is the displacement increment (m) of one
+ * body into and along the other: closure first, then the jlaw_dim - 1 components of shear. F is the
+ * traction (Pa), compression positive: the force on the body that moves by +d is -area F.
+ * C = dF/dd (Pa/m) in row-major order. Energies are per area (J/m2).
  *
- * A law does not change after reading: any number of threads may share it. States belong to the
- * caller; two threads must not advance one state at a time. No function but jlaw_read and jlaw_free
- * uses memory, files or the locale; none uses a global variable.
+ * A law is constant after reading: any number of threads may share it. States belong to the caller;
+ * two threads must not advance the same state at the same time. Only jlaw_read and jlaw_free allocate
+ * memory or access files. No function uses the locale or a global variable.
  *
- * Build with -ffp-contract=off: the same bits with every compiler and on every x86-64. For speed
- * -O3 -fno-math-errno -fno-trapping-math, which change no result; never -ffast-math. -march=native
- * compiles the law once, for this machine; without it gcc and clang do so for two kinds of x86-64.
+ * Build with -ffp-contract=off: the results are then bitwise identical with every compiler and on
+ * every x86-64. For speed add -O3 -fno-math-errno -fno-trapping-math, which change no result; never
+ * -ffast-math. -march=native compiles the law once, for this processor; without it gcc and clang
+ * compile it for two kinds of x86-64 and choose at run time.
  *
- * Symbols and order of the step are those of the page "theory-incremental" of the documentation
- * and of jointlaw/kernels/asperities.py.
+ * The page "theory-incremental" of the documentation and jointlaw/kernels/asperities.py describe the
+ * step, with the same symbols.
  */
 #ifndef JOINTLAW_H
 #define JOINTLAW_H
@@ -31,79 +32,84 @@
 #include <stddef.h>
 #endif
 #ifndef JLAW_FUNCTION
-#define JLAW_FUNCTION /* before every function and table: __device__ for CUDA */
+#define JLAW_FUNCTION /* qualifier of every function and table: __device__ for CUDA */
 #endif
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#define JLAW_MESSAGE 300 /* bytes that hold every message */
+#define JLAW_MESSAGE 300 /* bytes sufficient for every message */
 
 typedef struct jlaw_law jlaw_law;
 
 #ifndef JOINTLAW_NO_FILES
-/* Read a table file. NULL and a message if it cannot be read, is damaged or of another version. */
+/* Read a table file. Returns NULL and writes a message if the file is missing, damaged or of another
+ * version. */
 jlaw_law *jlaw_read(const char *file, char *message, size_t size);
 void jlaw_free(jlaw_law *law);
 #endif
 
-/* Components of d: 3, 2 in a plane, 1 for closure only; numbers of state, as in a snapshot */
+/* Components of d: 3, 2 for motion in a plane, 1 for closure only. Numbers of a state, as in a snapshot
+ * of the Python package */
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law);
 JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law);
 
-/* One step from state s0 to s1 (may be the same) by d (dim): F (dim), and C (dim, dim) if not NULL.
- * Returns 0; or -1 and a message where d or the state is not finite or forces would overflow:
- * nothing is written then. */
+/* Advance a joint from state s0 to s1, which may be the same array, by d (dim); writes F (dim), and C
+ * (dim, dim) unless it is NULL. Returns 0. If d or the state is not finite, or forces would overflow,
+ * it returns -1 and writes a message and nothing else. */
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size);
 
-/* The step of jlaw_update for n joints of an array, as fast as vectors make it with -DJOINTLAW_MANY
- * -march=native: their states begin `stride` numbers apart, d (n, dim), F (n, dim), and C (n, dim,
- * dim) if not NULL. The same bits. Returns n; or the number of the first joint whose step is refused:
- * it and those after it have not moved, and jlaw_update tells why. */
+/* Advance n joints of an array: states `stride` numbers apart, d (n, dim), F (n, dim), and C (n, dim,
+ * dim) unless it is NULL. -DJOINTLAW_MANY -march=native vectorises it over joints; the results are
+ * bitwise identical with jlaw_update. Returns n, or the index of the first joint whose step is
+ * invalid: this joint and all later ones are unchanged, and jlaw_update gives the reason. */
 JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_t stride,
                                       const double *d, double *F, double *C, size_t n);
 
-/* The start of a joint whose faces have never met, as blocks that meet anew after a fall: at first
- * touch, 100 mating lengths from the mated position along axis 2. Closure is counted from the mated
- * position: s[0] is then negative, and a host closes the joint from there on. Returns 0; or -1 for a
- * law with an infinite mating length, always mated: the state is then the virgin one. A bond of the
- * law is broken in either. */
+/* Initialise a joint whose faces do not interlock, for example blocks that touch again after a fall:
+ * at first touch, 100 mating lengths from the interlocked position along axis 2. Closure counts from
+ * the interlocked position, so s[0] is negative, and the host closes the joint from there on. Returns
+ * 0, or -1 for a law with an infinite mating length, which always interlocks: the state is then the
+ * virgin one. In both cases the bond of the law is broken. */
 JLAW_FUNCTION int jlaw_init_unmated(const jlaw_law *law, double *s);
 
-/* The step of jlaw_update without a check, for hosts that know their steps and for devices: row i of
- * the state is s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
+/* jlaw_update without its checks, for hosts that validate their steps and for GPUs. Row i of the state
+ * is s[i stride], so that joints may be stored side by side, (rows, n). C may be NULL. */
 JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
                              double *F, double *C);
 
-/* Elastic energy, and energy lost since the virgin state, in J/m2 */
+/* Elastic energy, and energy dissipated since the virgin state, J/m2 */
 JLAW_FUNCTION double jlaw_stored_energy(const jlaw_law *law, const double *s);
 JLAW_FUNCTION double jlaw_dissipated_energy(const jlaw_law *law, const double *s);
-/* Shares from 0 to 1. sliding: of all facets, those at their friction limit; slipping: of the
- * friction capacity, what is at its limit; separated: of all facets, those out of touch. */
-JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s, double shares[3]);
+/* Fractions from 0 to 1: facets at their friction limit (sliding); friction capacity that is exhausted
+ * (slipping); facets out of contact (separated) */
+JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s,
+                                          double fractions[3]);
 
-/* Unsheared joint: normal stress (Pa) at a closure (m), and the inverse. NaN where there is none. */
+/* Unsheared joint: normal stress (Pa) at a closure (m), and its inverse; NaN if there is no solution */
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure);
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress);
-/* Bound of |C| (Pa/m) while no facet is closed further: dt < 2 sqrt(mass/(area * this)). */
+/* Upper bound of |C| (Pa/m) as long as the effective closure of no facet exceeds `closure`. A time step
+ * is stable if dt < 2 sqrt(mass/(area * bound)). */
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure);
 
-/* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
- * host that cannot carry its axes with a body, and laws without a preferred direction (c = 0).
- * Shear turns exactly. Sliders and flattened depths are read between the azimuths of
- * their ring of facets: exact where the angle is a whole number of azimuths of every ring, else
- * the better the more there are. Sliders gain no energy; what they lose counts as dissipated. In a
- * plane the axis keeps or changes its sense. */
+/* Transform a state to axes 2 and 3 rotated by this angle (rad, from 2 to 3) about the normal, for
+ * hosts that cannot attach the axes to a body and laws without a preferred direction (c = 0). The
+ * displacement is rotated exactly. Slider forces and plastic indentations are interpolated between
+ * the azimuths of the facets of one inclination: exact if the angle is a multiple of the interval
+ * between azimuths at every inclination, otherwise the error decreases with their number. Sliders
+ * gain no energy, and energy that they lose counts as dissipated. In a plane the axis keeps or
+ * reverses its direction. */
 JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle);
-/* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
- * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
+/* Transform a state after the two bodies are exchanged: axes 1 and 3 reverse, axis 2 stays. The shear
+ * displacement along axis 2 changes its sign, along axis 3 it does not. Exact. */
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s);
 
-/* Of the law that the tables were made for: a Python state of another fingerprint does not fit. */
+/* Hash of the parameters of the law: store it with saved states, which fit only this law */
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
 
-/* The tables, for files NAME.h; not for the host */
+/* struct jlaw_law, for the generated files NAME.h; hosts do not access it */
 #include "layout.h"
 
 #ifdef __cplusplus
@@ -114,7 +120,7 @@ JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
 #if defined(JOINTLAW_IMPLEMENTATION) && !defined(JOINTLAW_IMPLEMENTED)
 #define JOINTLAW_IMPLEMENTED
 #ifdef __FAST_MATH__
-#error "jointlaw.h: -ffast-math breaks the tests for NaN; take -fno-math-errno -fno-trapping-math"
+#error "jointlaw.h: -ffast-math removes the checks for NaN; use -fno-math-errno -fno-trapping-math"
 #endif
 #ifdef __CUDACC_RTC__
 #define DBL_MAX 1.7976931348623157e308
@@ -134,20 +140,20 @@ JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* No fused operations here, whatever the flags */
+/* No fused multiply-add in this file, whatever the flags */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && !defined(__CUDACC__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off", "no-gcse", "no-gcse-after-reload")
 #endif
-#ifdef __GNUC__ /* all functions of vectors are inline; g++ would warn at the end of the file */
+#ifdef __GNUC__ /* functions of vectors are inline: no ABI to warn of */
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
-/* Four facets side by side in one vector, or (JOINTLAW_SCALAR, other compilers, CUDA) one after the
- * other with the same bits. AVX2 where the machine has it, found out at run time unless the compiler
- * may use it or JOINTLAW_NO_DISPATCH tells that there is one machine. */
+/* Vectors of four facets, or, with JOINTLAW_SCALAR, other compilers and CUDA, one facet at a time with
+ * the same bits. AVX2 is selected at run time if the processor supports it, unless the compiler may
+ * use it anyway, or JOINTLAW_NO_DISPATCH switches the selection off. */
 #if defined(__GNUC__) && !defined(JOINTLAW_SCALAR) && !defined(__CUDACC__) \
     && !defined(__CUDACC_RTC__)
 #define JL_W 4
@@ -166,7 +172,7 @@ enum { JLAW_TRACKS_DISSIPATION = 0 };
 enum { JLAW_TRACKS_DISSIPATION = 1 };
 #endif
 
-/* The law once more, for joints side by side: of as many as a vector of this machine has numbers */
+/* The law for as many joints as a vector of this processor has lanes */
 #if defined(JOINTLAW_MANY) && defined(__AVX2__) && defined(__OPTIMIZE__) \
     && defined(JLAW_FACET_VECTORS)
 #ifdef __AVX512DQ__
@@ -176,10 +182,10 @@ enum { JLAW_TRACKS_DISSIPATION = 1 };
 #endif
 #define JM_STATES_CONTIGUOUS
 #include "many.h"
-static void jlaw_step_vector_(const jlaw_law *law, double *s, size_t apart, const double *d,
+static void jlaw_step_vector_(const jlaw_law *law, double *s, size_t stride, const double *d,
                               double *F, double *C)
 {
-  const jm_states n = {s, 1, apart};
+  const jm_states n = {s, 1, stride};
   const int dim = law->dim;
   jm_real p[3], f[3], c[9];
   for (int l = 0; l < JM_W; l++)
@@ -191,7 +197,8 @@ static void jlaw_step_vector_(const jlaw_law *law, double *s, size_t apart, cons
   }
 }
 #endif
-#if defined(__AVX512F__) && !defined(__clang__) /* which makes gcc's code slower here */
+#if defined(__AVX512F__) \
+    && !defined(__clang__) /* with AVX-512 the code of gcc for facets is slower */
 #pragma GCC target("no-avx512f")
 #endif
 
@@ -201,7 +208,7 @@ static void jlaw_step_vector_(const jlaw_law *law, double *s, size_t apart, cons
 
 /* ------------------------------------------------------------------ messages */
 
-typedef struct {
+typedef struct { /* a buffer of `size` bytes, `at` of them written */
   char *to;
   size_t size, at;
 } jlaw_message_;
@@ -212,7 +219,7 @@ static JLAW_FUNCTION void jlaw_append_(jlaw_message_ *text, const char *words)
   if (text->size) text->to[text->at] = 0;
 }
 
-/* A number to five digits, without stdio and its locale */
+/* Append a number with five digits, without stdio and its locale */
 static JLAW_FUNCTION void jlaw_append_number_(jlaw_message_ *text, double x)
 {
   char digits[24];
@@ -242,7 +249,7 @@ static JLAW_FUNCTION void jlaw_append_number_(jlaw_message_ *text, double x)
 
 /* ------------------------------------------------------------------------ the step */
 
-/* Phi and Phi' at one y */
+/* Phi at y, and Phi' */
 static JLAW_FUNCTION double jlaw_first_loading_at_(const jlaw_law *law, double y, double *slope)
 {
   jl_real forces, slopes;
@@ -263,7 +270,7 @@ JLAW_MULTIVERSIONED JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s,
   jl_step_of_kind(law, n, d, F, C, JLAW_TRACKS_DISSIPATION, C != NULL, 0, NULL);
 }
 
-/* Whether all sliders hold forces that a law can have; 0 for NaN */
+/* Whether all slider forces are finite and of admissible size */
 static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
 {
   double sum[4] = {0.0, 0.0, 0.0, 0.0};
@@ -276,45 +283,46 @@ static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
 
 #define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
 #define JLAW_ELEMENT_ROWS(law) \
-  {JLAW_ELEMENTS(JL_ROWS) - 1} /* each element's rows, 0 without it; -1 */
+  {JLAW_ELEMENTS(JL_ROWS) - 1} /* number of rows of each element, 0 if the law lacks it; -1 ends */
 
-/* Damage of joints whose faces meet anew, which have neither bond nor cohesion */
+/* Damage of a joint that touches again after separation, without bond and cohesion */
 static JLAW_FUNCTION double jlaw_separated_damage_(const jlaw_law *law)
 {
   return law->coulomb ? JLAW_SEPARATED_STATE : 1.0;
 }
 
-/* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
+/* Whether energies, plastic indentations, degradation and damage of a state are valid for this law */
 static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double *s)
 {
-  const double *rest = s + jl_plastic_row(law), *worn = s + jl_degradation_row(law);
-  int good = fabs(s[law->dim]) <= DBL_MAX;
+  const double *plastic = s + jl_plastic_row(law), *degradation = s + jl_degradation_row(law);
+  int valid = fabs(s[law->dim]) <= DBL_MAX;
   for (int f = 0; law->yields && f < law->facets; f++)
-    good = good && rest[f] >= 0.0 && rest[f] <= law->max_effective_closure;
-  if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
+    valid = valid && plastic[f] >= 0.0 && plastic[f] <= law->max_effective_closure;
+  if (law->yields) valid = valid && fabs(plastic[law->facets]) <= DBL_MAX;
   if (law->degrades)
-    good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
+    valid = valid && degradation[0] >= 0.0 && degradation[0] <= 1.0 && degradation[1] >= 0.0
+            && degradation[1] <= DBL_MAX;
   const double *row = s + jl_element_row(law);
   const int rows[] = JLAW_ELEMENT_ROWS(law);
   for (int i = 0; rows[i] >= 0; i++)
     for (int left = rows[i]; left > 0; left--, row++)
-      good = good
-             && (left > 1 ? fabs(*row) < JLAW_MAX_STRENGTH
-                          : *row >= 0.0 && *row <= jlaw_separated_damage_(law));
-  return good
+      valid = valid
+              && (left > 1 ? fabs(*row) < JLAW_MAX_STRENGTH
+                           : *row >= 0.0 && *row <= jlaw_separated_damage_(law));
+  return valid
          && jlaw_sliders_are_valid_(s + jl_slider_row(law),
                                     jl_plastic_row(law) - jl_slider_row(law));
 }
 
 static JLAW_FUNCTION int jlaw_report_invalid_(const jlaw_law *law, const double *s, const double *d,
-                                              int damaged, char *message, size_t size)
+                                              int state_is_invalid, char *message, size_t size)
 {
   jlaw_message_ text = {message, size, 0};
   int finite = 1;
-  if (damaged) {
+  if (state_is_invalid) {
     jlaw_append_(&text,
-                 "the state holds numbers that are not finite or no forces of this law; nothing "
-                 "was moved. Start from zeros or from a state that this law wrote");
+                 "the state has numbers that are not finite or not valid for this law; the state "
+                 "is unchanged. Start from zeros or from a state that this law wrote");
     return -1;
   }
   for (int i = 0; i < law->dim; i++) {
@@ -322,34 +330,35 @@ static JLAW_FUNCTION int jlaw_report_invalid_(const jlaw_law *law, const double 
     jlaw_append_number_(&text, d[i]);
     finite = finite && fabs(d[i]) <= DBL_MAX;
   }
-  jlaw_append_(&text, finite ? ") m leads from closure "
-                             : ") m is not finite; nothing was moved. Look for the fault in the "
-                               "host's motion");
+  jlaw_append_(&text, finite ? ") m from closure "
+                             : ") m is not finite; the state is unchanged. Check the motion that "
+                               "the host computes");
   if (!finite) return -1;
   jlaw_append_number_(&text, s[0]);
-  jlaw_append_(&text, " m beyond the reach of ");
+  jlaw_append_(&text, " m exceeds the admissible closure of ");
   jlaw_append_number_(&text, law->max_effective_closure);
-  jlaw_append_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
+  jlaw_append_(&text,
+               " m, above which forces overflow; the state is unchanged. Use a smaller step");
   return -1;
 }
 
-/* Whether a state and a step are such as jlaw_update takes; else 0, and whether the state is not */
+/* Whether jlaw_update accepts a state and a step; state_is_invalid: whether the state is the reason */
 static JLAW_FUNCTION int jlaw_step_is_valid_(const jlaw_law *law, const double *s, const double *d,
-                                             int *damaged)
+                                             int *state_is_invalid)
 {
-  double far = 0.0, step_size = 0.0; /* NaN stays in sums */
-  for (int i = 0; i < law->dim; i++) far += fabs(s[i]), step_size += fabs(d[i]);
-  *damaged = !(far <= DBL_MAX) || !jlaw_state_is_valid_(law, s);
-  return !*damaged
-         && law->closure_per_displacement * (far + step_size) <= law->max_effective_closure;
+  double distance = 0.0, step_size = 0.0; /* NaN propagates through sums */
+  for (int i = 0; i < law->dim; i++) distance += fabs(s[i]), step_size += fabs(d[i]);
+  *state_is_invalid = !(distance <= DBL_MAX) || !jlaw_state_is_valid_(law, s);
+  return !*state_is_invalid
+         && law->closure_per_displacement * (distance + step_size) <= law->max_effective_closure;
 }
 
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size)
 {
-  int damaged;
-  if (!jlaw_step_is_valid_(law, s0, d, &damaged))
-    return jlaw_report_invalid_(law, s0, d, damaged, message, size);
+  int state_is_invalid;
+  if (!jlaw_step_is_valid_(law, s0, d, &state_is_invalid))
+    return jlaw_report_invalid_(law, s0, d, state_is_invalid, message, size);
   if (s1 != s0)
     for (int i = 0; i < jl_state_rows(law); i++) s1[i] = s0[i];
   jlaw_step(law, s1, 1, d, F, C);
@@ -360,35 +369,36 @@ JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_
                                       const double *d, double *F, double *C, size_t n)
 {
   const size_t dim = (size_t) law->dim;
-  size_t good = 0, at = 0;
-  for (int damaged; good < n; good++)
-    if (!jlaw_step_is_valid_(law, states + good * stride, d + good * dim, &damaged)) break;
+  size_t valid = 0, at = 0;
+  for (int state_is_invalid; valid < n; valid++)
+    if (!jlaw_step_is_valid_(law, states + valid * stride, d + valid * dim, &state_is_invalid))
+      break;
 #ifdef JM_W
-  for (; at + JM_W <= good; at += JM_W)
+  for (; at + JM_W <= valid; at += JM_W)
     jlaw_step_vector_(law, states + at * stride, stride, d + at * dim, F + at * dim,
                       C ? C + at * dim * dim : NULL);
 #endif
-  for (; at < good; at++)
+  for (; at < valid; at++)
     jlaw_step(law, states + at * stride, 1, d + at * dim, F + at * dim,
               C ? C + at * dim * dim : NULL);
-  return good;
+  return valid;
 }
 
-/* ------------------------------------------------------------ what a state is */
+/* -------------------------------------------------------- evaluation of a state */
 
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
 JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return jl_state_rows(law); }
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
 JLAW_FUNCTION int jlaw_init_unmated(const jlaw_law *law, double *s)
 {
-  const int far = law->interlock_decays && law->dim > 1;
+  const int separates = law->interlock_decays && law->dim > 1;
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
-  if (far) s[0] = law->first_touch_closure, s[1] = JLAW_UNMATED_DISTANCE * law->mating_length;
+  if (separates) s[0] = law->first_touch_closure, s[1] = JLAW_UNMATED_DISTANCE * law->mating_length;
   double *row = s + jl_element_row(law);
   const int rows[] = JLAW_ELEMENT_ROWS(law);
   for (int i = 0; rows[i] >= 0; row += rows[i++])
     if (rows[i]) row[rows[i] - 1] = jlaw_separated_damage_(law);
-  return far ? 0 : -1;
+  return separates ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated_energy(const jlaw_law *law, const double *s)
 {
@@ -407,28 +417,29 @@ JLAW_FUNCTION double jlaw_stored_energy(const jlaw_law *law, const double *s)
   return jlaw_measure_(law, s).stored;
 }
 
-JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s, double shares[3])
+JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s, double fractions[3])
 {
   const jl_measures all = jlaw_measure_(law, s);
-  shares[0] = all.sliding;
-  shares[1] = all.slipping;
-  shares[2] = all.separated;
+  fractions[0] = all.sliding;
+  fractions[1] = all.slipping;
+  fractions[2] = all.separated;
 }
 
 /* ------------------------------------------------------------ unsheared joint */
 
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
-  double slope, late = 0.0;
+  double slope, yield_correction = 0.0;
   if (!(closure <= law->max_effective_closure)) return NAN;
-  for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
+  for (int f = 0; law->yields && f < law->facets; f++) /* less stress by yielding */
     for (int i = JLAW_YIELD_CORRECTION; i < JLAW_YIELD_CORRECTION + 4; i += 2) {
       const double depth = jlaw_facet_value_(law, f, i + 1);
-      late += jlaw_facet_value_(law, f, i) * jlaw_first_loading_at_(law, closure - depth, &slope);
+      yield_correction +=
+          jlaw_facet_value_(law, f, i) * jlaw_first_loading_at_(law, closure - depth, &slope);
     }
   double stress =
       law->asperities
-          ? law->normal_stress_factor * jlaw_first_loading_at_(law, closure, &slope) - late
+          ? law->normal_stress_factor * jlaw_first_loading_at_(law, closure, &slope) - yield_correction
           : 0.0;
 #define JL_FIRST(name)                                                          \
   if (law->name) {                                                              \
@@ -454,7 +465,7 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
   double low = 0.0, high = law->max_search_closure;
   if (!(normal_stress >= 0.0 && jlaw_normal_stress(law, high) >= normal_stress)) return NAN;
-  while (1) { /* the stress rises: halve the exponent first, then the number */
+  while (1) { /* bisection: of the exponent at first, then of the number */
     const double middle =
         high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300)) : 0.5 * (low + high);
     if (!(middle > low && middle < high)) return low == 0.0 ? 0.0 : high;
@@ -463,17 +474,17 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
   }
 }
 
-/* --------------------------------------------------------------- turned axes */
+/* -------------------------------------------------------------- rotated axes */
 
-/* The vectors of elements in axes 2 and 3 that are turned, or turned round */
+/* Rotate or reflect the vectors of the elements in the plane of the joint */
 static JLAW_FUNCTION void jlaw_rotate_elements_(const jlaw_law *law, double *s,
-                                                const double turn[2][2])
+                                                const double rotation[2][2])
 {
   double *row = s + jl_element_row(law);
   const int rows[] = JLAW_ELEMENT_ROWS(law);
   for (int i = 0; rows[i] >= 0; row += rows[i++]) {
     const double q[2] = {rows[i] > 1 ? row[0] : 0.0, rows[i] > 2 ? row[1] : 0.0};
-    for (int j = 0; j < rows[i] - 1; j++) row[j] = turn[j][0] * q[0] + turn[j][1] * q[1];
+    for (int j = 0; j < rows[i] - 1; j++) row[j] = rotation[j][0] * q[0] + rotation[j][1] * q[1];
   }
 }
 
@@ -481,60 +492,61 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
-  double *qs = s + jl_slider_row(law), *qt = qs + M * D, *depth = qt + M * D;
+  double *qs = s + jl_slider_row(law), *qt = qs + M * D, *z = qt + M * D;
   for (int f = 0; f < M; f++) {
-    const int other = (int) jlaw_facet_value_(law, f, JLAW_MIRROR); /* f itself across the plane */
-    if (other < f) continue;                                        /* both have changed */
+    const int other =
+        (int) jlaw_facet_value_(law, f, JLAW_MIRROR); /* f itself at a right angle to axis 2 */
+    if (other < f) continue;                          /* already exchanged */
     for (int i = 0; i < D; i++) {
-      const double here = qs[f * D + i], turned = -qt[f * D + i]; /* t changes its sense */
+      const double qs_f = qs[f * D + i], qt_f = -qt[f * D + i]; /* t reverses */
       qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
-      qs[other * D + i] = here, qt[other * D + i] = turned;
+      qs[other * D + i] = qs_f, qt[other * D + i] = qt_f;
     }
     if (!law->yields) continue;
-    const double here = depth[f];
-    depth[f] = depth[other], depth[other] = here;
+    const double z_f = z[f];
+    z[f] = z[other], z[other] = z_f;
   }
   const double swap[2][2] = {{-1.0, 0.0}, {0.0, 1.0}};
   jlaw_rotate_elements_(law, s, swap);
 }
 
-/* Numbers of a ring of n facets, `apart` from one another, read at azimuths turned by the angle: the
- * trigonometric interpolation of n (even) places, or the straight one, which makes no new extremes */
-static JLAW_FUNCTION void jlaw_rotate_ring_(double *x, int n, int apart, double angle, int straight)
+/* Interpolate the numbers of n facets of one inclination, `spacing` from one another, at azimuths
+ * rotated by the angle: trigonometrically (n is even), or linearly, which creates no new extremes */
+static JLAW_FUNCTION void jlaw_rotate_ring_(double *x, int n, int spacing, double angle, int linear)
 {
   double old[JLAW_MAX_AZIMUTHS];
   const double pi = 3.14159265358979323846;
-  for (int j = 0; j < n; j++) old[j] = x[j * apart], x[j * apart] = 0.0;
+  for (int j = 0; j < n; j++) old[j] = x[j * spacing], x[j * spacing] = 0.0;
   for (int j = 0; j < n; j++)
     for (int k = 0; k < n; k++) {
-      const double way = remainder(angle + 2.0 * pi * (j - k) / n, 2.0 * pi), half = sin(0.5 * way);
+      const double phi = remainder(angle + 2.0 * pi * (j - k) / n, 2.0 * pi), half = sin(0.5 * phi);
       double weight = 1.0;
-      if (straight) weight = fmax(1.0 - fabs(way) * n / (2.0 * pi), 0.0);
-      else if (fabs(half) > 1e-9) weight = sin(0.5 * n * way) * cos(0.5 * way) / (n * half);
-      x[j * apart] += weight * old[k];
+      if (linear) weight = fmax(1.0 - fabs(phi) * n / (2.0 * pi), 0.0);
+      else if (fabs(half) > 1e-9) weight = sin(0.5 * n * phi) * cos(0.5 * phi) / (n * half);
+      x[j * spacing] += weight * old[k];
     }
 }
 
-/* Brings sliders beyond their friction limit back to it */
+/* Return sliders that exceed their friction limit to it */
 static JLAW_FUNCTION void jlaw_limit_sliders_(const jlaw_law *law, double *s)
 {
   const jl_states n = {s, 1, 0};
   const int M = law->facets, D = law->cells;
   for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
-    const int some = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
+    const int count = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
     const double *cell = jl_cell_table(law, at);
     jl_facet_step o;
     jl_evaluate_facets(law, n, at, &o);
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_FACET_LANES) {
       const int row = jl_slider_row(law) + at * D + i;
-      jl_real G, kappa, qs = jl_load(n, row, D, some), qt = jl_load(n, row + M * D, D, some);
+      jl_real G, kappa, qs = jl_load(n, row, D, count), qt = jl_load(n, row + M * D, D, count);
       jl_evaluate_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
-      const jl_real cap = o.strength * G;
+      const jl_real limit = o.strength * G;
       const jl_real size = jl_sqrt(qs * qs + qt * qt);
-      const jl_mask beyond = size > cap;
-      const jl_real share = jl_select(beyond, cap / jl_select(beyond, size, 1.0), 1.0);
-      jl_store(n, row, D, some, qs * share);
-      jl_store(n, row + M * D, D, some, qt * share);
+      const jl_mask exceeds = size > limit;
+      const jl_real factor = jl_select(exceeds, limit / jl_select(exceeds, size, 1.0), 1.0);
+      jl_store(n, row, D, count, qs * factor);
+      jl_store(n, row + M * D, D, count, qt * factor);
     }
   }
 }
@@ -543,24 +555,24 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
-  double *q = s + jl_slider_row(law), *depth = s + jl_plastic_row(law);
-  if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
+  double *q = s + jl_slider_row(law), *z = s + jl_plastic_row(law);
+  if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis reverses */
   if (dim != 3) return;
   const double along = s[1], across = s[2];
   s[1] = c * along + d * across, s[2] = c * across - d * along;
-  const double turn[2][2] = {{c, d}, {-d, c}};
-  jlaw_rotate_elements_(law, s, turn);
-  for (int f = 0, n; f < M; f += n) { /* rings */
+  const double rotation[2][2] = {{c, d}, {-d, c}};
+  jlaw_rotate_elements_(law, s, rotation);
+  for (int f = 0, n; f < M; f += n) { /* inclinations */
     n = (int) jlaw_facet_value_(law, f, JLAW_RING_SIZE);
     for (int i = 0; i < D; i++) {
       jlaw_rotate_ring_(q + f * D + i, n, D, angle, 0);
       jlaw_rotate_ring_(q + (M + f) * D + i, n, D, angle, 0);
     }
-    if (law->yields) jlaw_rotate_ring_(depth + f, n, 1, angle, 1);
+    if (law->yields) jlaw_rotate_ring_(z + f, n, 1, angle, 1);
   }
   jlaw_limit_sliders_(law, s);
   const double after = jlaw_measure_(law, s).sheared;
-  if (after > before) /* sliders gain nothing */
+  if (after > before) /* interpolation must not add energy */
     for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
   else s[dim] += before - after;
 }
@@ -568,9 +580,9 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 /* ------------------------------------------------------------- table files */
 #ifndef JOINTLAW_NO_FILES
 
-#define JLAW_MAX_FILE_BYTES (1L << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
+#define JLAW_MAX_FILE_BYTES (1L << 28) /* of a table file; laws have 1e5 to 1e7 */
 
-/* The bytes of a file and a zero; NULL if it cannot be read */
+/* Read a file and append a zero byte; NULL if it cannot be read */
 static char *jlaw_read_bytes_(const char *file, size_t *length)
 {
   FILE *stream = fopen(file, "rb");
@@ -585,7 +597,7 @@ static char *jlaw_read_bytes_(const char *file, size_t *length)
   return bytes;
 }
 
-/* FNV-1a of 64 bits, without carriage returns: any other change of one byte changes it */
+/* 64-bit FNV-1a hash, without carriage returns: any other change of one byte changes it */
 static unsigned long long jlaw_checksum_(const char *bytes, const char *end)
 {
   unsigned long long sum = 0xCBF29CE484222325ULL;
@@ -594,7 +606,7 @@ static unsigned long long jlaw_checksum_(const char *bytes, const char *end)
   return sum;
 }
 
-/* Past blanks and lines that begin with # */
+/* Skip blanks and comment lines, which begin with # */
 static const char *jlaw_skip_blanks_(const char *at)
 {
   while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '#')
@@ -603,7 +615,7 @@ static const char *jlaw_skip_blanks_(const char *at)
   return at;
 }
 
-/* Reads a word into `word`; empty if there is none or it is too long */
+/* Read a word into `word`; empty if there is none or it is too long */
 static const char *jlaw_read_word_(const char *at, char *word, size_t room)
 {
   size_t n = 0;
@@ -612,8 +624,8 @@ static const char *jlaw_read_word_(const char *at, char *word, size_t room)
   return at;
 }
 
-/* Reads a number; NULL if it is none or not finite. Floats are hexadecimal and have no point: neither
- * locale nor rounding matters. */
+/* Read a finite number; NULL if there is none. Floats are hexadecimal without a decimal point, so that
+ * they depend on neither locale nor rounding. */
 static const char *jlaw_read_number_(const char *at, double *number)
 {
   const char *begin = jlaw_skip_blanks_(at);
@@ -622,92 +634,94 @@ static const char *jlaw_read_number_(const char *at, double *number)
   return end > begin && *end <= ' ' && fabs(*number) <= DBL_MAX ? end : NULL;
 }
 
-/* Reads all numbers into law; NULL or what is wrong */
+/* Read the integers and floats of a law; NULL, or the reason for a failure */
 static const char *jlaw_parse_scalars_(const char **at, jlaw_law *law)
 {
-#define X(name, whole, least, most) {#name, offsetof(jlaw_law, name), whole, least, most},
+#define X(name, is_integer, lower, upper) \
+  {#name, offsetof(jlaw_law, name), is_integer, lower, upper},
   static const struct {
     const char *name;
-    size_t place;
-    int is_whole;
-    double least, most;
+    size_t offset;
+    int is_integer;
+    double lower, upper;
   } keys[] = {JLAW_KEYWORDS(X)};
 #undef X
   char word[sizeof law->fingerprint];
   for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
     double number;
-    char *to = (char *) law + keys[i].place;
+    char *to = (char *) law + keys[i].offset;
     *at = jlaw_read_word_(*at, word, sizeof word);
-    if (strcmp(word, keys[i].name)) return "a keyword is missing, unknown or not in its place";
+    if (strcmp(word, keys[i].name)) return "a keyword is missing, unknown or out of order";
     *at = jlaw_read_number_(*at, &number);
-    if (!*at || !(number >= keys[i].least && number <= keys[i].most))
-      return "a parameter is no number or out of its bounds";
-    const int whole_number = (int) (keys[i].is_whole ? number : 0.0);
-    if (keys[i].is_whole) memcpy(to, &whole_number, sizeof whole_number);
+    if (!*at || !(number >= keys[i].lower && number <= keys[i].upper))
+      return "a parameter is not a number or out of bounds";
+    const int integer = (int) (keys[i].is_integer ? number : 0.0);
+    if (keys[i].is_integer) memcpy(to, &integer, sizeof integer);
     else memcpy(to, &number, sizeof number);
   }
   return NULL;
 }
 
-/* Reads the text of a table file into law; NULL or what is wrong */
+/* Parse the text of a table file; NULL, or the reason for a failure */
 static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
 {
   char word[sizeof law->fingerprint];
   at = jlaw_read_word_(at, word, sizeof word);
-  if (strcmp(word, "fingerprint")) return "it does not tell its fingerprint";
+  if (strcmp(word, "fingerprint")) return "its fingerprint is missing";
   at = jlaw_read_word_(at, law->fingerprint, sizeof law->fingerprint);
-  const char *wrong = jlaw_parse_scalars_(&at, law);
-  if (wrong) return wrong;
+  const char *error = jlaw_parse_scalars_(&at, law);
+  if (error) return error;
   const size_t blocks = (size_t) (law->facets + JLAW_FACET_LANES - 1) / JLAW_FACET_LANES;
   const char *words[4] = {"facet", "depth", "curve", "energy"};
   const size_t sizes[4] = {blocks * JLAW_COLUMNS * JLAW_FACET_LANES,
                            blocks * (size_t) law->cells * JLAW_ROWS * JLAW_FACET_LANES,
                            4 * (size_t) law->pieces, 4 * (size_t) law->pieces};
-  const size_t all = sizes[0] + sizes[1] + sizes[2] + sizes[3];
-  if (all > length / 2) return "its sizes do not fit one another";
-  double *to = law->memory = (double *) malloc(all * sizeof *law->memory);
-  if (!to) return "there is no memory for it";
+  const size_t total = sizes[0] + sizes[1] + sizes[2] + sizes[3];
+  if (total > length / 2) return "its sizes are inconsistent";
+  double *to = law->memory = (double *) malloc(total * sizeof *law->memory);
+  if (!to) return "no memory is left for it";
   for (int i = 0; i < 4; i++) {
     at = jlaw_read_word_(at, word, sizeof word);
     if (strcmp(word, words[i])) return "a table is missing, too short or too long";
     for (size_t n = 0; n < sizes[i]; n++, to++)
-      if (!(at = jlaw_read_number_(at, to))) return "a table holds what is no number";
+      if (!(at = jlaw_read_number_(at, to))) return "a table has an entry that is not a number";
   }
   law->facet = law->memory, law->depth = law->facet + sizes[0];
   law->curve = law->depth + sizes[1], law->energy = law->curve + sizes[2];
-  for (size_t n = 0; n < sizes[0]; n++) { /* A and what follows it are no less than zero */
-    const size_t which = n / JLAW_FACET_LANES % JLAW_COLUMNS;
-    if ((which >= JLAW_A && !(law->facet[n] >= 0.0))
-        || (which == JLAW_MIRROR && !(law->facet[n] < law->facets)))
+  for (size_t n = 0; n < sizes[0]; n++) { /* column A and all later columns are >= 0 */
+    const size_t column = n / JLAW_FACET_LANES % JLAW_COLUMNS;
+    if ((column >= JLAW_A && !(law->facet[n] >= 0.0))
+        || (column == JLAW_MIRROR && !(law->facet[n] < law->facets)))
       return "a facet is out of bounds";
   }
   for (int f = 0; f < law->facets;) {
     const double ring = jlaw_facet_value_(law, f, JLAW_RING_SIZE);
     if (!(ring >= 1.0 && ring <= (double) JLAW_MAX_AZIMUTHS && ring <= law->facets - f))
-      return "a ring of facets is out of bounds";
+      return "the number of facets of an inclination is out of bounds";
     f += (int) ring;
   }
-  return *jlaw_skip_blanks_(at) ? "something follows the last table" : NULL;
+  return *jlaw_skip_blanks_(at) ? "there is text after the last table" : NULL;
 }
 
+/* Check version and checksum of a table file, then parse it; NULL, or the reason for a failure */
 static const char *jlaw_parse_file_(char *bytes, size_t length, jlaw_law *law)
 {
   static const char magic[] = "jointlaw tables ";
   const char *at = bytes + sizeof magic - 1;
   double version;
-  if (strncmp(bytes, magic, sizeof magic - 1)) return "it is no table file of jointlaw";
+  if (strncmp(bytes, magic, sizeof magic - 1)) return "it is not a table file of jointlaw";
   at = jlaw_read_number_(at, &version);
   if (!at || version != JLAW_TABLE_FORMAT)
-    return "it is of another version than this jointlaw.h; export law and header anew, together";
+    return "it has another format than this jointlaw.h; export law and header again, together";
   char *end = bytes + length, word[20];
   while (end > bytes && end[-1] <= ' ' && end[-1] >= 0) end--;
   while (end > bytes && end[-1] != '\n') end--; /* to the last line */
   const char *sum = jlaw_read_word_(jlaw_read_word_(end, word, sizeof word), word, sizeof word);
   if (strncmp(end, "sum ", 4) || strspn(word, "0123456789abcdef") != 16 || word[16]
       || *jlaw_skip_blanks_(sum))
-    return "it ends too early: copy it again, whole";
+    return "it is truncated: copy the complete file again";
   if (strtoull(word, NULL, 16) != jlaw_checksum_(bytes, end))
-    return "it is damaged: its sum is wrong; export it again";
+    return "it is damaged: its checksum is wrong; export it again";
   *end = 0;
   return jlaw_parse_(at, law, length);
 }
@@ -716,16 +730,16 @@ jlaw_law *jlaw_read(const char *file, char *message, size_t size)
 {
   jlaw_message_ text = {message, size, 0};
   size_t length = 0;
-  const char *wrong = "it cannot be read";
+  const char *error = "it cannot be read";
   char *bytes = jlaw_read_bytes_(file, &length);
   jlaw_law *law = (jlaw_law *) calloc(1, sizeof *law);
-  if (bytes && law) wrong = jlaw_parse_file_(bytes, length, law);
+  if (bytes && law) error = jlaw_parse_file_(bytes, length, law);
   free(bytes);
-  if (!wrong) return law;
+  if (!error) return law;
   jlaw_free(law);
   jlaw_append_(&text, file);
   jlaw_append_(&text, ": ");
-  jlaw_append_(&text, wrong);
+  jlaw_append_(&text, error);
   return NULL;
 }
 

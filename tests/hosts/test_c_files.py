@@ -86,7 +86,7 @@ def test_compiles_as_cuda(tmp_path, law):
 
 @pytest.mark.parametrize("cc", ["gcc", "clang"])
 def test_fast_math_is_refused(tmp_path, cc):
-    with pytest.raises(AssertionError, match="take -fno-math-errno -fno-trapping-math"):
+    with pytest.raises(AssertionError, match="use -fno-math-errno -fno-trapping-math"):
         build(tmp_path, SOURCE, "-ffast-math", "-c", cc=cc)
 
 
@@ -137,23 +137,23 @@ def resigned(text):
 
 
 BAD = {
-    "empty": (lambda text: "", "it is no table file of jointlaw"),
+    "empty": (lambda text: "", "it is not a table file of jointlaw"),
     "version": (
         lambda text: text.replace(f"tables {TABLE_FORMAT}", "tables 2", 1),
-        "of another version than this jointlaw.h; export law and header anew",
+        "another format than this jointlaw.h; export law and header again",
     ),
-    "cut": (lambda text: text[: len(text) // 2], "it ends too early: copy it again, whole"),
+    "cut": (lambda text: text[: len(text) // 2], "it is truncated: copy the complete file again"),
     "one digit": (
         lambda text: text.replace("0x1", "0x2", 1),
-        "it is damaged: its sum is wrong",
+        "it is damaged: its checksum is wrong",
     ),
     "unknown keyword": (
         lambda text: resigned(text.replace("\ncurve_exponent ", "\nfall ", 1)),
-        "a keyword is missing, unknown or not in its place",
+        "a keyword is missing, unknown or out of order",
     ),
     "huge": (
         lambda text: resigned(text.replace("\ncells 3", "\ncells 999999", 1)),
-        "its sizes do not fit one another",
+        "its sizes are inconsistent",
     ),
     "short table": (
         lambda text: resigned(text.replace("\nenergy\n", "\n", 1)),

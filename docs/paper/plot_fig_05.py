@@ -2,14 +2,14 @@
 Figure 5: orientation densities of smooth and rough interfaces
 ==============================================================
 
-Eq. 14 with b = c = 0. The paper sketches this figure without values; a = 3 and a = 6 are those that
-it later uses for its rough and smooth interface. Asperities of a smooth interface face its normal,
-those of a very rough one all directions.
+Eq. 14 with b = c = 0. The paper sketches this figure without values; a = 3 and a = 6 are the
+values that it later uses for its rough and smooth interface. Asperities of a smooth interface face
+its normal, asperities of a very rough interface face all directions.
 """
 
 import math
 
-from _common import beside, density_curve, draw
+from _common import density_curve, draw, print_comparison
 
 import jointlaw as jl
 
@@ -23,4 +23,4 @@ draw(panels, ("C0", "C1", "C2"), xlabel="inclination θ (°)", ylabel="density �
 
 for a, printed in ((3, "19°"), (6, "10°")):
     mean = f"{math.degrees(jl.Orientation(a).mean):.2f}°"
-    beside((f"mean inclination at a = {a}, Eq. 17", printed, mean))
+    print_comparison((f"mean inclination at a = {a}, Eq. 17", printed, mean))

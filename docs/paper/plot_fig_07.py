@@ -7,7 +7,7 @@ towards the horizon, b = 2 towards the normal; c makes them depend on the azimut
 density is constant at a = 1 only; at a = 2 it is constant in cos aθ, not per solid angle.
 """
 
-from _common import beside, density_curve, draw
+from _common import density_curve, draw, print_comparison
 
 import jointlaw as jl
 
@@ -25,4 +25,4 @@ draw(panels, ("C0", "C1", "C2"), xlabel="inclination θ (°)", ylabel="density �
 
 for title, printed in zip(panels, ("90° (π/2)", "45° (π/4)"), strict=False):
     theta, density = panels[title]["b = 0"]
-    beside((f"{title}: largest inclination", printed, f"{theta[density > 0][-1]:.2f}°"))
+    print_comparison((f"{title}: largest inclination", printed, f"{theta[density > 0][-1]:.2f}°"))

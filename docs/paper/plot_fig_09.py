@@ -8,7 +8,7 @@ the curve is a circle. The paper prints no values.
 """
 
 import numpy as np
-from _common import beside, draw
+from _common import draw, print_comparison
 
 import jointlaw as jl
 
@@ -25,8 +25,12 @@ panels = {"": lines}
 (axes,) = draw(panels, ("C0", "C1"), polar=True, xlabel="azimuth φ (°)", ylabel="Cₛ/C₁₁")
 axes.set_ylim(0.0, 1.2)
 
-skewed, even = (y for _, y in lines.values())
-beside(
-    ("c = 1/3", "larger along axis 2", f"{skewed[0]:.3f} along axis 2, {skewed[45]:.3f} along 3"),
-    ("c = 0", "a circle", f"{even.min():.3f} to {even.max():.3f}"),
+anisotropic, isotropic = (y for _, y in lines.values())
+print_comparison(
+    (
+        "c = 1/3",
+        "larger along axis 2",
+        f"{anisotropic[0]:.3f} along axis 2, {anisotropic[45]:.3f} along 3",
+    ),
+    ("c = 0", "a circle", f"{isotropic.min():.3f} to {isotropic.max():.3f}"),
 )

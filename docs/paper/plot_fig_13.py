@@ -9,23 +9,23 @@ stiffer in shear than in closure. Measured points are not printed.
 """
 
 import numpy as np
-from _common import LAW, TOTAL, beside, draw, initial_stiffness, law, mirrored
+from _common import LAW, TOTAL, draw, initial_stiffness, mirrored, preset_law, print_comparison
 
 azimuth = np.arange(0.0, 361.0, 7.5)  # degrees
 panels = {TOTAL: {}, LAW: {}}
 for form, lines in enumerate(panels.values()):
     for stress in (0.5e6, 2e6, 10e6):
         quarter = np.radians(azimuth)[:13]
-        values = [initial_stiffness(law("jing-replica"), stress, x)[form] for x in quarter]
-        whole = mirrored(values)
-        lines[f"{stress * 1e-6:g} MPa"] = azimuth, whole / whole[:-1].mean()
+        values = [initial_stiffness(preset_law("jing-replica"), stress, x)[form] for x in quarter]
+        circle = mirrored(values)
+        lines[f"{stress * 1e-6:g} MPa"] = azimuth, circle / circle[:-1].mean()
 
 labels = {"xlabel": "azimuth φ (°)", "ylabel": "stiffness/mean", "ylim": (0.0, 1.4)}
 for axes in draw(panels, ("C0", "C1s", "C2o"), polar=True, **labels):
-    for line, every in zip(axes.get_lines()[1:], ((0, 4), (2, 4)), strict=True):
-        line.set_markevery(every)
+    for line, markers in zip(axes.get_lines()[1:], ((0, 4), (2, 4)), strict=True):
+        line.set_markevery(markers)
 
 for kind, lines in panels.items():
     along = [y[0] / y[12] for _, y in lines.values()]
     text = ", ".join(f"{x:.3f}" for x in along) + " at 0.5, 2, 10 MPa"
-    beside((f"stiffness along axis 2 over axis 3, {kind}", "depends on direction", text))
+    print_comparison((f"stiffness along axis 2 over axis 3, {kind}", "depends on direction", text))

@@ -7,18 +7,21 @@ the contact density enters. Resistance tends to the friction of the asperities a
 right panel dotted lines repeat the total form. The paper does not print the end of its axis.
 """
 
-from _common import LAW, SHEAR, TOTAL, beside, draw, incremental, ratio, total
+from _common import LAW, SHEAR, TOTAL, draw, incremental, print_comparison, ratio, total
 
-to, closure = 4e-6, 1e-6  # m
+to = 4e-6  # m
+closure = 1e-6  # m
 panels = {TOTAL: {}, LAW: {}}
-printed, ours = panels.values()
+total_lines, incremental_lines = panels.values()
 for a in (2, 3, 6, 9):
     label = f"a = {a}"
     tests = [run(f"linear-a{a}", to, closure=closure) for run in (total, incremental)]
-    printed[label], ours[label] = ((test.shear * 1e6, ratio(test)) for test in tests)
-    ours[f"_{label}, total"] = printed[label]
+    total_lines[label], incremental_lines[label] = (
+        (test.shear * 1e6, ratio(test)) for test in tests
+    )
+    incremental_lines[f"_{label}, total"] = total_lines[label]
     ends = f"{ratio(tests[0])[-1]:.3f} (total form), {ratio(tests[1])[-1]:.3f} (incremental law)"
-    beside((f"F₂/F₁ at 4 µm, {label}", "tends to μ = 0.6 as a grows", ends))
+    print_comparison((f"F₂/F₁ at 4 µm, {label}", "tends to μ = 0.6 as a grows", ends))
 for lines in panels.values():
     lines["μ"] = [0.0, to * 1e6], [0.6, 0.6]
 

@@ -2,7 +2,7 @@
 Figure 18: directional friction angle of the concrete replica
 =============================================================
 
-arctan(shear resistance/normal stress) when all asperities in touch first slide, μ = 0.47 and the
+arctan(shear resistance/normal stress) when all asperities in contact first slide, μ = 0.47 and the
 parameters of section 4.2. The paper finds it to depend on the direction, hardly on a normal stress
 above zero, and to be larger at zero. In the total form it does not depend on the normal stress at
 all. Grey: arctan μ + π/2a, reached when the slip is far above the closure, hence at any slip when
@@ -10,9 +10,19 @@ the normal stress is zero. Measured points are not printed.
 """
 
 import numpy as np
-from _common import LAW, TOTAL, beside, draw, mirrored, replica_yield, slip_limit, total_yield
+from _common import (
+    LAW,
+    TOTAL,
+    draw,
+    mirrored,
+    print_comparison,
+    replica_yield,
+    slip_limit,
+    total_yield,
+)
 
-azimuth, circle = np.arange(0.0, 361.0, 7.5), np.arange(0.0, 361.0, 2.0)  # degrees
+azimuth = np.arange(0.0, 361.0, 7.5)  # degrees
+circle = np.arange(0.0, 361.0, 2.0)  # degrees
 quarter = np.radians(azimuth)[:13]
 limit = circle, np.full(circle.shape, slip_limit())
 panels = {
@@ -30,4 +40,6 @@ draw(panels, [("C0", "0.4"), ("C0--", "C1", "C2:", "0.4")], polar=True, **labels
 for kind, lines in panels.items():
     for label, (_, angle) in lines.items():
         text = "{:.1f}°, {:.1f}°, {:.1f}°".format(*angle[[0, len(angle) // 8, len(angle) // 4]])
-        beside((f"at 0, 45, 90°, {kind}, {label}", "directional; larger at zero stress", text))
+        print_comparison(
+            (f"at 0, 45, 90°, {kind}, {label}", "directional; larger at zero stress", text)
+        )

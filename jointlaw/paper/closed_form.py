@@ -6,11 +6,11 @@ With U = a theta in [0, pi/2], beta = 2/a and the azimuth integrated out, the de
     g2(U) = (3c/8) (3 sin U - sin 3U)               its share of cos 2 phi,
 
 while sin^2, cos^2 and sin cos of theta are 1, cos and sin of beta U. So every entry of both tables
-is a sum of integrals of sin pU cos beta U and sin pU sin beta U with p = 1 and 3, that is of sin kU
-and cos kU with k = p + beta and p - beta. Written with sinc they have no pole at k = 0 (a = 2).
+is a sum of integrals of sin pU cos beta U and sin pU sin beta U with p = 1 and 3, or of sin kU and
+cos kU with k = p + beta and p - beta. Written with sinc they have no pole at k = 0 (a = 2).
 
-Stiffnesses are per asperity, C/N, in the unit of kn and ks (N/m). Where an `orientation` is asked
-for, any object with a, b and c serves: `Shape` is one whose a may be infinite.
+Stiffnesses are per asperity, C/N, in the unit of kn and ks (N/m). An `orientation` may be an
+`Orientation` or a `Shape`, whose a may be infinite.
 """
 
 import math
@@ -23,7 +23,7 @@ from ..support.checks import Array, at_least, number
 
 
 class Shape(NamedTuple):
-    """a, b and c alone (Eq. 14): `Shape(math.inf)` is the perfectly smooth interface."""
+    """The parameters a, b, c of Eq. 14; `Shape(math.inf)` is the perfectly smooth interface."""
 
     a: float
     b: float = 0.0
@@ -40,45 +40,49 @@ def elastic(orientation: HasShape, kn: float, ks: float) -> Array:
     Returns (C11, C22, C33)/N in N/m, shape (3,); the cross terms are zero.
     Raises ValueError for a negative or non-finite stiffness and outside the bounds of Eq. 18.
     """
-    kn, ks = at_least("kn", kn, 0.0), at_least("ks", ks, 0.0)
-    (sin2, sin2_twist), (cos2, _), _ = _moments(_shape(orientation), 0.0)
+    kn = at_least("kn", kn, 0.0)
+    ks = at_least("ks", ks, 0.0)
+    (sin2, sin2_anisotropic), (cos2, _), _ = _moments(_shape(orientation), 0.0)
     normal = kn * cos2 + ks * sin2
     shear = (kn * sin2 + ks * (1.0 + cos2)) / 2
-    twist = (kn - ks) * sin2_twist / 2
-    return np.array([normal, shear + twist, shear - twist])
+    anisotropy = (kn - ks) * sin2_anisotropic / 2
+    return np.array([normal, shear + anisotropy, shear - anisotropy])
 
 
 def inelastic(orientation: HasShape, kn: float, ks: float, mu: float) -> Array:
     """Inelastic stiffness under closure: Table 2, which is Eq. 29, for any a, b, c.
 
     kn, ks: normal and shear stiffness of an asperity (N/m), >= 0; mu: its friction, >= 0.
-    Returns (C11p, C22p, C33p)/N in N/m, shape (3,); the cross terms are zero. All is zero where no
-    asperity leans beyond the sliding angle of Eq. 30, so at a = infinity for every mu > 0; at
-    mu = 0 the limit is (0, ks (1 + c)/2, ks (1 - c)/2).
+    Returns (C11p, C22p, C33p)/N in N/m, shape (3,); the cross terms are zero. All terms are zero
+    where no asperity is inclined beyond the sliding angle of Eq. 30, so at a = infinity for every
+    mu > 0; at mu = 0 the limit is (0, ks (1 + c)/2, ks (1 - c)/2).
     Raises ValueError for a negative or non-finite number and outside the bounds of Eq. 18.
     """
-    shape, start = _shape(orientation), sliding_angle(kn, ks, mu)
-    start_U = start * shape.a if start > 0 else 0.0
-    if start_U >= math.pi / 2:
+    shape = _shape(orientation)
+    theta_s = sliding_angle(kn, ks, mu)
+    U_s = theta_s * shape.a if theta_s > 0 else 0.0
+    if U_s >= math.pi / 2:
         return np.zeros(3)
-    (sin2, _), (cos2, cos2_twist), (sincos, sincos_twist) = _moments(shape, start_U)
+    moments = _moments(shape, U_s)
+    (sin2, _), (cos2, cos2_anisotropic), (sincos, sincos_anisotropic) = moments
     normal = ks * sin2 - mu * kn * sincos
     shear = (ks * cos2 + mu * kn * sincos) / 2
-    twist = (ks * cos2_twist + mu * kn * sincos_twist) / 2
-    return np.array([normal, shear + twist, shear - twist])
+    anisotropy = (ks * cos2_anisotropic + mu * kn * sincos_anisotropic) / 2
+    return np.array([normal, shear + anisotropy, shear - anisotropy])
 
 
 def closure_stiffness(orientation: HasShape, kn: float, ks: float, mu: float) -> float:
     """C11/N = (C11e - C11p)/N of a closing interface, in N/m: Eq. 31 and 32 at mu = 0, for any a.
 
-    Without friction it is kn times the mean of cos^2 theta, whatever ks.
+    Without friction it is kn times the mean of cos^2 theta, independent of ks.
     """
     return float(elastic(orientation, kn, ks)[0] - inelastic(orientation, kn, ks, mu)[0])
 
 
 def sliding_angle(kn: float, ks: float, mu: float) -> float:
     """Inclination in rad beyond which asperities slide in closure: arctan(mu kn/ks), Eq. 30."""
-    kn, ks = at_least("kn", kn, 0.0), at_least("ks", ks, 0.0)
+    kn = at_least("kn", kn, 0.0)
+    ks = at_least("ks", ks, 0.0)
     return math.atan2(at_least("mu", mu, 0.0) * kn, ks)
 
 
@@ -90,7 +94,7 @@ def shear_stiffness(orientation: HasShape, kn: float, ks: float, azimuth: float)
 
 
 def _shape(orientation: HasShape) -> Shape:
-    """a, b and c within their bounds; a may be infinite."""
+    """The parameters a, b, c, checked against Eq. 18; a may be infinite."""
     return Shape(*bounded(orientation.a, orientation.b, orientation.c, smooth=True))
 
 
@@ -99,17 +103,23 @@ def _moments(shape: Shape, U0: float) -> Array:
 
     Weighted with g0 (first column) and with g2 (second).
     """
-    b, c, beta = shape.b, shape.c, 2.0 / shape.a
-    first, third = _integrals(1.0, beta, U0), _integrals(3.0, beta, U0)
-    weight_1, weight_3 = np.array([1 - b / 8, 9 * c / 8]), np.array([3 * b / 8, -3 * c / 8])
+    b = shape.b
+    c = shape.c
+    beta = 2.0 / shape.a
+    first = _integrals(1.0, beta, U0)
+    third = _integrals(3.0, beta, U0)
+    weight_1 = np.array([1 - b / 8, 9 * c / 8])
+    weight_3 = np.array([3 * b / 8, -3 * c / 8])
     one, cos, sin = np.outer(first, weight_1) + np.outer(third, weight_3)
     return np.array([(one - cos) / 2, (one + cos) / 2, sin / 2])
 
 
 def _integrals(p: float, beta: float, U0: float) -> Array:
     """Integrals of sin pU times 1, cos beta U and sin beta U from U0 to pi/2, shape (3,)."""
-    middle, half = (math.pi / 2 + U0) / 2, (math.pi / 2 - U0) / 2
+    middle = (math.pi / 2 + U0) / 2
+    half = (math.pi / 2 - U0) / 2
     k = np.array([p, p + beta, p - beta])
     length = 2 * half * np.sinc(k * half / math.pi)
-    sine, cosine = length * np.sin(k * middle), length * np.cos(k * middle)
+    sine = length * np.sin(k * middle)
+    cosine = length * np.cos(k * middle)
     return np.array([sine[0], (sine[1] + sine[2]) / 2, (cosine[2] - cosine[1]) / 2])

@@ -1,4 +1,4 @@
-"""Parameter sets printed in the paper, in SI units, each with its source."""
+"""Parameter sets of the paper in SI units, each with its source and assumptions."""
 
 import tomllib
 from pathlib import Path
@@ -8,18 +8,18 @@ from ..support.checks import one_of, remedy
 
 
 def names() -> list[str]:
-    """Names of all presets."""
+    """Names of all presets, sorted."""
     return sorted(path.stem for path in Path(__file__).parent.glob("*.toml"))
 
 
 def text(name: str) -> str:
-    """TOML text of a preset. Raises ValueError for an unknown name."""
+    """TOML text of a preset, with its source. Raises ValueError for an unknown name."""
     one_of("preset", name, tuple(names()))
     return Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
 
 
 def about(name: str) -> dict[str, str]:
-    """Title, source and assumptions of a preset."""
+    """Title, source and, where the paper leaves values open, assumptions of a preset."""
     return dict(tomllib.loads(text(name))["about"])
 
 
@@ -29,7 +29,10 @@ def load(name: str) -> JointLaw:
 
 
 def load_any(name_or_file: str) -> JointLaw:
-    """The law of a preset, or of a TOML file if `name_or_file` names one."""
+    """The law of a preset or of a TOML file.
+
+    Raises ValueError for a name that is neither, and for an invalid file.
+    """
     if name_or_file in names():
         return load(name_or_file)
     if Path(name_or_file).is_file():

@@ -7,9 +7,9 @@ Rooms, each using only those above it: scene, contact, dynamics, output, studies
 try:
     from .dynamics.simulation import Simulation
     from .output.run import run
-    from .scene import Refused, Scene, load, parse
+    from .scene import Scene, SceneError, load, parse
 except ImportError as error:  # `python -m` tells it in one line if it is about this package
     needs = f"the block demo lacks a package ({error}): pip install 'jointlaw[demo]'"
     raise ImportError(needs, name=__name__) from error
 
-__all__ = ["Refused", "Scene", "Simulation", "load", "parse", "run"]
+__all__ = ["Scene", "SceneError", "Simulation", "load", "parse", "run"]

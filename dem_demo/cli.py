@@ -20,7 +20,7 @@ from .output.folder import ABLATION, STRENGTH, require_free
 from .output.monitors import friction_angle
 from .output.record import named, sentence, sentences, told
 from .output.run import run, steps_to
-from .scene import TEMPLATE, Refused, load, shipped
+from .scene import TEMPLATE, SceneError, load, shipped
 from .studies import ablate, compare, strength
 
 VERSION = 3  # of strength.json
@@ -90,7 +90,7 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         print(f"dem_demo: {str(stop) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
-    except (Refused, PathError, ValueError, OSError) as error:
+    except (SceneError, PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
     return 0
@@ -136,8 +136,8 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
               "by its first steps")  # fmt: skip
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
-              f"{len(rock.blocks) - len(rock.free)} fixed", *rock.told, sep="\n  ")  # fmt: skip
-    if sim.unstable.any() and sim.scene.run.seat and not sim.time:
+              f"{len(rock.blocks) - len(rock.free)} fixed", *rock.messages, sep="\n  ")  # fmt: skip
+    if sim.unstable.any() and sim.scene.run.settle and not sim.time:
         print(f"{sim.unstable.sum()} blocks cannot be held and move from the first step: "
               f"{told(named(sim.scene, sim.unstable))}")  # fmt: skip
 
@@ -145,7 +145,7 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
 def _pace(sim: Simulation) -> float:
     """Time (s) of a step, by the first ones of a copy; 0 where these are refused."""
     copy, steps, started = Simulation(sim.scene, saved=sim.state()), 0, time.perf_counter()
-    with suppress(Refused):
+    with suppress(SceneError):
         while steps < TRIED and time.perf_counter() < started + PATIENCE:
             copy.step()
             steps += 1

@@ -12,7 +12,7 @@ import numpy as np
 
 from jointlaw.native.library import load
 
-from .scene import Refused
+from .scene import SceneError
 
 SHOWN = 6  # of a joint: shares sliding, slipping, separated; J/m2 stored, lost; damage of its bond
 NUMBERS = "blocks", "corners", "contacts", "driven"
@@ -75,10 +75,10 @@ def address(array: Any) -> int:
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
-    """The library. Raises Refused where it was not built."""
+    """The library. Raises SceneError where it was not built."""
     loaded = load()
     if loaded is None:
-        raise Refused(
+        raise SceneError(
             "blocks need the compiled library: install a C compiler or `pip install ziglang`, then "
             "run `python -m jointlaw.native`"
         )

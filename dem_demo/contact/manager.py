@@ -12,7 +12,7 @@ moved far enough to matter; between such renewals the geometry is plain arrays.
 import numpy as np
 
 from ..compiled import address
-from ..scene import Refused, Scene
+from ..scene import Scene, SceneError
 from .geometry import Contacts, Outlines
 
 TILT = np.sin(np.radians(6.5))  # how far a side of a corner may dip below the edge
@@ -150,7 +150,7 @@ class ContactManager:
         """The contacts between pairs (p, 2) of blocks and the edges (k, 2) that meet there; where
         two are equal, that of a code in `known` is meant.
 
-        Raises Refused for an overlap that is too deep, or that no corner sees.
+        Raises SceneError for an overlap that is too deep, or that no corner sees.
         """
         n = len(pairs)
         limit, skin = self.deepest[pairs].min(axis=1), self._skin(*pairs.T)
@@ -180,7 +180,7 @@ class ContactManager:
         if lost.any():
             p = int(lost.argmax())
             one, other = (self.blocks[n].name for n in pairs[p])
-            raise Refused(
+            raise SceneError(
                 f"blocks {one!r} and {other!r} overlap by {true[p]:.3g} m where no corner is over "
                 "an edge that faces it: start the blocks apart, or resume with a smaller step"
             )
@@ -188,7 +188,7 @@ class ContactManager:
     def refuse(self, pair, depth: float) -> None:
         """Refuse an overlap (m) of two blocks beyond run.max_overlap."""
         one, other = (self.blocks[n].name for n in pair)
-        raise Refused(
+        raise SceneError(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below "
             f"{self.deepest[list(pair)].min():.3g} m (a share of the smaller block's width); "
             "draw them apart, resume with a smaller step, or use stiffer joints, lower loads or "

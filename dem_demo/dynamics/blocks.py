@@ -10,7 +10,7 @@ import numpy as np
 import pymunk
 
 from ..contact import ContactManager, Contacts, Outlines
-from ..scene import Drives, Refused, Scene, Stress
+from ..scene import Drives, Scene, SceneError, Stress
 
 MOVED = 0.25  # most of its skin that a block may move in a step: else contacts could be missed
 
@@ -49,7 +49,7 @@ class Blocks:
         self._near: set[tuple[int, ...]] = set()
         self._build(scene)
         self.gone, self.support = np.zeros(len(blocks), bool), np.zeros((len(blocks), 3))
-        self.remove(list(scene.gone))
+        self.remove(list(scene.removed))
 
     def _build(self, scene: Scene) -> None:
         """pymunk's bodies, and its callbacks."""
@@ -99,7 +99,7 @@ class Blocks:
         """Refuse block i, which moves too far in a step of dt (s) to find its contacts."""
         u, v, spin = np.abs(self.velocity[:, i])
         path, most = (u + v + spin * self.reach[i]) * dt, MOVED * self.skins[i]
-        raise Refused(
+        raise SceneError(
             f"block {self.names[i]!r} moves {path:.3g} m in one step: must stay below {most:.3g} m "
             "(a quarter of its skin, run.skin); resume with a smaller step"
         )

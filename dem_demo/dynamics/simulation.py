@@ -14,7 +14,7 @@ import numpy as np
 from jointlaw.support.files import write_files
 
 from ..contact import PARTS, STALE, ContactManager, Contacts, Joints
-from ..scene import Files, Refused, Scene, parse
+from ..scene import Files, Scene, SceneError, parse
 from .blocks import MOVED, Blocks, apply_loads
 from .energy_balance import DROPPED, EnergyBalance
 from .equilibrium import begin, out_of_balance, seat
@@ -58,7 +58,7 @@ class Simulation:
     stages of the excavation began, inf before (s). Where neither `step` nor the scene sets the time
     step, it is halved when joints close too far for it, or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
-    Refused for a start that the method cannot carry.
+    SceneError for a start that the method cannot carry.
     """
 
     def __init__(self, scene: Scene, step: float | None = None, saved: Saved | None = None) -> None:
@@ -88,7 +88,7 @@ class Simulation:
         return self.manager.contacts
 
     def step(self) -> None:
-        """One time step. Raises Refused for a state that the method cannot carry.
+        """One time step. Raises SceneError for a state that the method cannot carry.
 
         1. The blocks move. Their contacts follow to where they are by now; new ones are looked for
            if blocks have moved far. An excavation takes blocks away, or lets their support go.
@@ -135,7 +135,7 @@ class Simulation:
             int(np.isfinite(self.stage_start_times).sum()),
         )
         due = self.n % LOOKS == 0 and n < len(stages)
-        if due and (self._rests() if (at := stages[n]["at"]) is None else self.time >= at):
+        if due and (self._rests() if (at := stages[n]["start"]) is None else self.time >= at):
             taken, c, joints = stages[n]["blocks"], self.contacts, self.joints
             mine = (np.isin(c.a, taken) | np.isin(c.b, taken)) * self.scene.thickness
             stress, shear = mine * c.length * joints.traction.T
@@ -144,7 +144,7 @@ class Simulation:
             self.manager.urgent[taken], self.world.stale = True, 1
             self.stage_start_times[n], n = self.time, n + 1
         if blocks.support.any():
-            left = self.stage_start_times[n - 1] + stages[n - 1]["over"] - self.time
+            left = self.stage_start_times[n - 1] + stages[n - 1]["release_time"] - self.time
             blocks.support *= max(left, 0.0) / max(left + self.dt, self.dt)
             self.energy_balance.load(blocks, apply_loads(self.scene, blocks, self.manager), self.dt)
 
@@ -196,7 +196,7 @@ class Simulation:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
         scene, blocks, manager, joints = self.scene, self.blocks, self.manager, self.joints
         slid = begin(scene, blocks, manager, joints)
-        if scene.run.seat and joints.n and blocks.free.any():
+        if scene.run.settle and joints.n and blocks.free.any():
             slid = seat(scene, blocks, manager, joints, slid)
         manager.follow(blocks.motion)
         self.initial = blocks.motion.copy()
@@ -228,10 +228,10 @@ class Simulation:
             )
             limit = impact_limit(scene, self.blocks, self.manager.outlines, stiffness)
         if not np.isfinite(limit):
-            raise Refused("forces move no block, so no time step follows: set run.step (s)")
+            raise SceneError("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
             return scene.run.fraction * limit
-        falls = not scene.run.seat or self.unstable.any() or self.blocks.velocity.any()
+        falls = not scene.run.settle or self.unstable.any() or self.blocks.velocity.any()
         driven = any(len(drive.times) > 1 for drive in scene.drives)
         self.fraction_reason = [*FRACTIONS][0 if falls else 1 if driven else 2]
         return FRACTIONS[self.fraction_reason] * limit

@@ -16,7 +16,7 @@ from scipy.sparse import csc_array, csr_array, diags
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from ..contact import Contacts, Joints, Outlines
-from ..scene import Refused, Scene
+from ..scene import Scene, SceneError
 from .blocks import Blocks
 
 DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one
@@ -66,7 +66,7 @@ class StepLimit:
         The limit falls at most as the square root of the largest growth of any joint's stiffness.
         """
         if dt > SAFE * self.current:
-            raise Refused(
+            raise SceneError(
                 f"time step {dt:.3g} s: must stay below {SAFE} of the limit, which has fallen "
                 f"to {self.current:.3g} s as the joints closed; resume with a smaller step"
             )

@@ -1,6 +1,6 @@
 """Output: what a run records, writes and draws.
 
-monitors     what a scene's [watch] table asks for, and what the law alone says of it
+monitors     what a scene's [monitor] table asks for, and what the law alone says of it
 record       the history of a run, and what became of each rock mass
 pictures     of blocks and joints, animations, curves
 vtk          frames as VTK files

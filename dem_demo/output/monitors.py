@@ -7,7 +7,7 @@ import numpy as np
 import jointlaw as jl
 
 from ..dynamics.simulation import Simulation
-from ..scene import Law, Scene, turn
+from ..scene import Law, Scene, rotation
 
 POINT = "x_m", "y_m", "vx_m/s", "vy_m/s"
 SLIP_DISTANCE = 2e-3  # m, for laws without a finite mating length
@@ -15,7 +15,7 @@ ROUNDS = 50  # most trials of an angle; a handful is enough where there is one
 
 
 def watched_slips(sim: Simulation) -> dict[tuple[int, int], dict]:
-    """What is known at the start of the slips that the scene's [watch] table names, by the moving
+    """What is known at the start of the slips that the scene's [monitor] table names, by the moving
     block and its base."""
     slips, scene = {}, sim.scene
     for moving, base in scene.slip:
@@ -64,7 +64,7 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
     """The edge of a block that another's centroid is farthest outside of, by its number among all
     edges, and its outward normal."""
     x, y, angle = sim.blocks.motion[:3, block]
-    corners = sim.scene.blocks[block].local @ turn(angle).T + [x, y]
+    corners = sim.scene.blocks[block].local @ rotation(angle).T + [x, y]
     along = np.roll(corners, -1, axis=0) - corners
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
     face = int(((sim.blocks.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
@@ -72,18 +72,18 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
 
 
 def readings(sim: Simulation) -> dict[str, float]:
-    """What the scene's [watch] table asks for, now; the unit ends the name. Pins are told as the
+    """What the scene's [monitor] table asks for, now; the unit ends the name. Pins are told as the
     base sees them, which itself is told if it is driven."""
     groups, scene = [], sim.scene
     for moving, base in (*scene.slip, *scene.shear):
         joint = {"base angle_deg": base_angle(sim, moving, base), **_joint(sim, moving, base)}
         groups.append((scene.blocks[moving].name, joint))
-    groups += [(f"joint {i + 1}", _joint(sim, *pair)) for i, pair in enumerate(scene.near)]
+    groups += [(f"joint {i + 1}", _joint(sim, *pair)) for i, pair in enumerate(scene.point_joints)]
     origin = base_of(scene, sim.blocks.motion)
-    for i, (block, point) in enumerate(scene.pins):
+    for i, (block, point) in enumerate(scene.points):
         here = _point(sim, block, point) - origin
         values = *here.tolist(), float(np.hypot(*(here[:2] - point)))
-        groups.append((f"pin {i + 1}", dict(zip((*POINT, "moved_m"), values, strict=True))))
+        groups.append((f"point {i + 1}", dict(zip((*POINT, "moved_m"), values, strict=True))))
     if scene.base is not None and scene.blocks[scene.base].moves:
         groups.append(("base", dict(zip(POINT, origin.tolist(), strict=True))))
     return {f"{name}: {key}": value for name, group in groups for key, value in group.items()}
@@ -92,7 +92,7 @@ def readings(sim: Simulation) -> dict[str, float]:
 def _point(sim: Simulation, block: int, point: tuple[float, float]) -> np.ndarray:
     """Place and velocity (4,) of a point of a block that was drawn at `point` (m, m/s)."""
     x, y, angle, u, v, spin = sim.blocks.motion[:, block]
-    right, up = turn(angle) @ (np.asarray(point) - sim.scene.blocks[block].centroid)
+    right, up = rotation(angle) @ (np.asarray(point) - sim.scene.blocks[block].centroid)
     return np.array([x + right, y + up, u - spin * up, v + spin * right])
 
 

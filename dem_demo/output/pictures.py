@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from jointlaw.support.progress import track
 from jointlaw.support.pyplot import escape_math, style, written
 
-from ..scene import turn, usual_size
+from ..scene import median_size, rotation
 from .monitors import shear_curve
 from .record import CREEP, Record, sentences
 
@@ -35,7 +35,7 @@ ARROW = 0.02  # of the farthest: shorter ways bear no arrow
 def outlines(record: Record, i: int) -> list[np.ndarray]:
     """Corners (m, 2) of all blocks in frame i (m); NaN for those that are gone."""
     return [
-        block.local @ turn(angle).T + [x, y]
+        block.local @ rotation(angle).T + [x, y]
         for block, (x, y, angle) in zip(record.scene.blocks, record.motion[i][:3].T, strict=True)
     ]
 
@@ -70,7 +70,7 @@ class Pictures:
         self.low, self.high = low - margin, high + margin
         self.free = np.array([not block.fixed for block in blocks])
         self.most = max(float(np.nanmax(record.moved[self.free])), 1e-6)
-        size = usual_size(block for block in blocks if not block.fixed)
+        size = median_size(block for block in blocks if not block.fixed)
         self.longer = float(f"{0.5 * size / self.most:.0e}")  # of arrows than what they stand for
         self.unit, self.name = (1e3, "mm") if self.most < 0.1 else (1.0, "m")
         frames = [frame["normal_stress_Pa"] for frame in record.joints]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..dynamics.energy_balance import COLUMNS
 from ..dynamics.simulation import Simulation
-from ..scene import Scene, usual_size
+from ..scene import Scene, median_size
 from .monitors import base_of, law_between, readings, watched_slips
 
 FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
@@ -22,9 +22,9 @@ class Record:
 
     joints[f]: by name, "who" (k, 2) the two blocks; "ends" (k, 2, 2) the segment of joint that a
     contact carries; "law" (k,) its number in the scene; and numbers (k,) with their unit in the
-    name. stresses[f] (3, n): xx, yy, xy of the blocks (Pa). monitored[f]: what the scene's [watch]
-    asks for; slips: of its joints; laws: of the watched joints; state: that of the last frame, to
-    return to; steps: of the run; loose (n,): blocks that nothing held at step 0; initial (6, n):
+    name. stresses[f] (3, n): xx, yy, xy of the blocks (Pa). monitored[f]: readings of
+    [monitor]; slips: of its joints; laws: of these joints; state: of the last frame, to return to;
+    steps: of the run; loose (n,): blocks that nothing held at step 0; initial (6, n):
     motion there, also of a run that is resumed.
     """
 
@@ -61,7 +61,7 @@ class Record:
         return np.array([row[name] for row in self.monitored])
 
     def write(self, path: Path) -> None:
-        """history.csv: times, energies and what the scene's [watch] asks for."""
+        """history.csv: times, energies and what the scene's [monitor] asks for."""
         header = ["time_s", *(f"{c}_J" for c in COLUMNS), "energy_error", *self.monitored[0]]
         rows = zip(self.times, self.energy, self.monitored, strict=True)
         write_csv(path, header, ([t, *e, *w.values()] for t, e, w in rows))
@@ -122,7 +122,7 @@ def block_stresses(sim: Simulation) -> np.ndarray:
     arm = np.tile(c.at, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
     parts = fx * arm.real, fy * arm.imag, 0.5 * (fx * arm.imag + fy * arm.real)
     sums = np.array([np.bincount(block, part, len(blocks)) for part in parts])
-    other = np.array([block.fixed or bool(block.held) for block in blocks])
+    other = np.array([block.fixed or bool(block.prescribed) for block in blocks])
     if stress := sim.scene.in_situ:
         other[c.outlines.block[stress.edges]] = True
     return np.where(other, np.nan, sums / [one.section.area for one in blocks])
@@ -151,14 +151,14 @@ def outcomes(record: Record) -> list[dict]:
     groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks
     drawn = [block.centroid + base_of(record.scene, record.initial)[:2] for block in blocks]
     settled = np.hypot(*(record.initial[:2].T - drawn).T)
-    rest = {i for i, block in enumerate(blocks) if not (block.fixed or block.held)}
+    rest = {i for i, block in enumerate(blocks) if not (block.fixed or block.prescribed)}
     groups |= {"other blocks" if groups else "blocks": sorted(rest.difference(*groups.values()))}
     for name, group in groups.items():
         free = [i for i in group if np.isfinite(last[i, 0])]
         if not free:
             continue
         moved, creep = record.moved[free], float(crept[free].max())
-        limit = FAILED * usual_size(blocks[i] for i in free)
+        limit = FAILED * median_size(blocks[i] for i in free)
         failed = int((moved > limit).sum())
         out.append(
             {

@@ -14,7 +14,7 @@ from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy_balance import COLUMNS
 from ..dynamics.simulation import Simulation, require_text
-from ..scene import Refused, Scene, usual_size
+from ..scene import Scene, SceneError, median_size
 from .folder import BLOCKS, HISTORY, clear_run
 from .monitors import look
 from .pictures import Pictures, curves
@@ -32,7 +32,7 @@ def run(
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
 
     pictures: their format, None for none; vtk: VTK files too, which needs meshio.
-    Returns (record, summary). A state that the method cannot carry raises Refused, Ctrl-C raises
+    Returns (record, summary). A state that the method cannot carry raises SceneError, Ctrl-C raises
     KeyboardInterrupt; before, all is written up to the last frame, and the state of then into
     `folder`/refused or `folder`/state, from where the run can be resumed. Results of another run in
     `folder` are replaced whole. Raises ValueError, before the first step, for an `until` that
@@ -46,7 +46,7 @@ def run(
     stopped: BaseException | None = None
     try:
         play(sim, record, until)
-    except (Refused, KeyboardInterrupt) as error:
+    except (SceneError, KeyboardInterrupt) as error:
         stopped = error
     summary = {
         "version": VERSION,
@@ -73,7 +73,7 @@ def run(
     }
     told = summary["stopped"]
     if folder:
-        place = folder / ("refused" if isinstance(stopped, Refused) else "state")
+        place = folder / ("refused" if isinstance(stopped, SceneError) else "state")
         clear_run(folder)
         sim.save(place, record.state)
         write(record, summary, folder, pictures, vtk)
@@ -92,7 +92,7 @@ def play(
     until: float | None = None,
     stop: Callable[[Record], bool] = lambda record: False,
 ) -> None:
-    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused."""
+    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises SceneError."""
     left, taken, dt = steps_to(sim, until), 0, 0.0
     with tqdm(total=left, desc=sim.scene.title, disable=not sys.stderr.isatty()) as bar:
         while left:
@@ -115,11 +115,11 @@ def play(
 def to_failure(scene: Scene, until: float | None) -> tuple[Record, str]:
     """A run to `until` (s, default the scene's end), or until a block has moved by the usual size
     of a block; and why it was refused, if it was: what is recorded by then is kept."""
-    sim, size = Simulation(scene), usual_size(block for block in scene.blocks if not block.fixed)
+    sim, size = Simulation(scene), median_size(block for block in scene.blocks if not block.fixed)
     record, refused = Record(sim), ""
     try:
         play(sim, record, until, lambda record: bool(np.nanmax(record.moved) > size))
-    except Refused as error:
+    except SceneError as error:
         refused = str(error)
     return record, refused
 

@@ -1,43 +1,43 @@
-"""Scenes: blocks, laws, drives and joint sets, read from TOML and checked.
+"""Scenes: blocks, laws, drives and joint sets, read from TOML and validated.
 
-keys       the keys of all tables, and what each may be
+keys       the keys of all tables, with a rule for each value
 blocks     convex blocks
-laws       joint laws and Coulomb's
+laws       joint laws and Coulomb's law
 drives     prescribed motions
 cutting    an outline cut along joint sets
-scene      a scene in memory, and what is refused of its states
+scene      a scene in memory, and the error of a state that it cannot continue from
 read       a scene from its file
 """
 
-from .blocks import Block, turn, usual_size
+from .blocks import Block, median_size, rotation
 from .drives import Drives
 from .keys import Tables, overlay
-from .laws import USUAL, WHOLE, Files, Law, build_law, opens_to, springs
+from .laws import INTACT_ROCK, TYPICAL_STRESS, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
-from .scene import Refused, Run, Scene, Stress
+from .scene import Run, Scene, SceneError, Stress
 
 __all__ = [
+    "INTACT_ROCK",
     "TEMPLATE",
-    "USUAL",
-    "WHOLE",
+    "TYPICAL_STRESS",
     "Block",
     "Drives",
     "Files",
     "Law",
-    "Refused",
     "Run",
     "Scene",
+    "SceneError",
     "Stress",
     "Tables",
     "build",
     "build_law",
     "load",
+    "median_size",
     "opens_to",
     "overlay",
     "parse",
     "read_tables",
+    "rotation",
     "shipped",
     "springs",
-    "turn",
-    "usual_size",
 ]

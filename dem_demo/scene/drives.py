@@ -1,6 +1,6 @@
 """Prescribed motions: a base that tilts, a machine that shears, an earthquake that shakes.
 
-Records of earthquakes and of machines are CSV files of time and of what the rock does then.
+Records of earthquakes and of machines are CSV files with two columns, time and motion.
 """
 
 import re
@@ -17,10 +17,16 @@ from .blocks import Block
 from .keys import AXES, Tables
 from .laws import Files
 
-SAMPLES = 40  # of a sine, per cycle
-# Keys that go together, of the three ways to say a motion
-WAYS = {"times", "values", "ease", "back"}, {"sine"}, {"file", "scale", "baseline"}
-UNITS = {  # of the second column: which time derivative of the motion it is, and its SI unit
+SAMPLES_PER_CYCLE = 40  # of a sine
+DEFAULT_RAMP = 0.1  # s
+# The three ways to prescribe a motion, each with the keys that belong together
+MOTION_KEYS = (
+    {"times", "values", "ramp", "reverse"},
+    {"sine"},
+    {"file", "scale", "baseline"},
+)
+# Units of the second column of a record: order of the time derivative, and value in SI units
+UNITS = {
     "m": (0, 1.0), "cm": (0, 1e-2), "mm": (0, 1e-3),
     "m/s": (1, 1.0), "cm/s": (1, 1e-2), "mm/s": (1, 1e-3),
     "m/s2": (2, 1.0), "cm/s2": (2, 1e-2), "gal": (2, 1e-2), "g": (2, 9.80665),
@@ -29,168 +35,212 @@ UNITS = {  # of the second column: which time derivative of the motion it is, an
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Motion of blocks, all alike, along "x" or "y" (m) or "turn" (rad) about their centroids.
+    """A prescribed motion of blocks, the same for all of them.
 
-    Straight lines between (times, values), averaged over the last `ease` seconds so that the
-    machine does not strike the rock at a corner; before and after them the blocks rest. `smooth`:
-    a cubic spline that begins and ends at rest instead.
-    With `order` 1 or 2 the values are velocities or accelerations (m/s, m/s2), and after the last
-    the blocks keep their velocity, so that nothing strikes them. `back`: once `block` has slid
-    `slid` (m) along the driven block, that moves by `by` from where it is within `over` (s).
+    blocks: numbers of the blocks in the scene.
+    axis: 0 and 1 for a displacement along x and y (m), 2 for a rotation about the centroid (rad).
+    times (n,), in s, and values (n,): linear between the points; at rest before and after them.
+    ramp: duration (s) of the moving average that is applied to the values, so that the velocity
+        does not jump at a point.
+    reverse: reversal of the motion, None for none. Once the block `block` has slipped by `slip` (m)
+        along the driven block, the driven block moves by `by` (m or rad) from its present position
+        within `duration` (s).
+    order: time derivative that `values` are: 0 displacements, 1 velocities (m/s), 2 accelerations
+        (m/s2). With 1 and 2 the blocks keep their last velocity, because a stop would be an impact.
+    smooth: whether displacements are interpolated by a cubic spline that begins and ends at rest.
     """
 
     blocks: tuple[int, ...]
     axis: int
     times: tuple[float, ...]
     values: tuple[float, ...]
-    ease: float = 0.0
-    back: dict[str, float] | None = None
+    ramp: float = 0.0
+    reverse: dict[str, float] | None = None
     order: int = 0
     smooth: bool = False
 
     @cached_property
     def path(self) -> BSpline:
-        """Displacement (m or rad) over the time (s)."""
+        """Displacement (m or rad) as a function of time (s)."""
         if self.smooth:
             return make_interp_spline(self.times, self.values, k=3, bc_type="clamped")
-        if not self.ease:
+        if not self.ramp:
             return make_interp_spline(self.times, self.values, k=1).antiderivative(self.order)
-        corners = np.union1d(self.times, np.add(self.times, self.ease))
-        now, before = (np.interp(corners - s, self.times, self.values) for s in (0.0, self.ease))
-        return make_interp_spline(corners, (now - before) / self.ease, k=1).antiderivative()
+        corners = np.union1d(self.times, np.add(self.times, self.ramp))
+        present = np.interp(corners, self.times, self.values)
+        delayed = np.interp(corners - self.ramp, self.times, self.values)
+        mean_velocity = make_interp_spline(corners, (present - delayed) / self.ramp, k=1)
+        return mean_velocity.antiderivative()
 
     def __call__(self, t: float, reversed_at: float = np.inf) -> float:
-        """Prescribed displacement at time t, when it was sent back at `reversed_at`."""
+        """Return the prescribed displacement (m or rad) at time t (s).
+
+        reversed_at: time (s) at which the motion was reversed, inf if it was not.
+        """
         if np.isfinite(reversed_at):
-            return _sent_back(self, reversed_at)(t)
+            return _reversed_drive(self, reversed_at)(t)
         path = self.path
-        at = min(max(t, path.t[0]), path.t[-1])
-        goes_on = (t - at) * path(at, nu=1) if self.order else 0.0
-        return float(path(at) + goes_on)
+        inside = min(max(t, path.t[0]), path.t[-1])
+        coasted = (t - inside) * path(inside, nu=1) if self.order else 0.0
+        return float(path(inside) + coasted)
 
 
 @cache
-def _sent_back(drive: Drive, at: float) -> Drive:
-    """A drive that was told at time `at` to go back."""
-    n, here = int(np.searchsorted(drive.times, at)), float(np.interp(at, drive.times, drive.values))
-    values = *drive.values[:n], here, here + drive.back["by"]
-    return replace(drive, times=(*drive.times[:n], at, at + drive.back["over"]), values=values)
+def _reversed_drive(drive: Drive, time: float) -> Drive:
+    """Return a drive that follows another one until a time (s) and its reversal from there on."""
+    kept = int(np.searchsorted(drive.times, time))
+    present = float(np.interp(time, drive.times, drive.values))
+    return replace(
+        drive,
+        times=(*drive.times[:kept], time, time + drive.reverse["duration"]),
+        values=(*drive.values[:kept], present, present + drive.reverse["by"]),
+    )
 
 
 class Drives:
-    """The drives of a scene.
+    """All drives of a scene, as arrays.
 
-    rows, axes, which (m,): driven block, its motion, and the number of the drive that moves it;
-    reversed_at (d,): when each drive was told to go back, inf before (s); aim (m,): velocities that
-    the driven blocks are to have next, for the compiled step.
+    rows, axes, which (m,): block, motion (0 x, 1 y, 2 rotation) and number of the drive of each
+    prescribed motion. reversed_at (d,): time at which each drive was reversed, inf before (s).
+    aim (m,): velocities of the next step (m/s or rad/s), read by the compiled step.
     """
 
     def __init__(self, drives: tuple[Drive, ...]) -> None:
         self.drives = drives
-        moved = [(block, d.axis, i) for i, d in enumerate(drives) for block in d.blocks]
-        self.rows, self.axes, self.which = np.array(moved, int).reshape(-1, 3).T.copy()
+        motions = [(block, d.axis, i) for i, d in enumerate(drives) for block in d.blocks]
+        self.rows, self.axes, self.which = np.array(motions, int).reshape(-1, 3).T.copy()
         self.reversed_at = np.full(len(drives), np.inf)
-        self.aim = np.zeros(len(moved))
+        self.aim = np.zeros(len(motions))
 
     def velocity(self, t: float, dt: float) -> np.ndarray:
-        """Velocities (m,) that carry the driven blocks exactly from t to t + dt."""
+        """Return the velocities (m,) that carry the driven blocks exactly from t to t + dt (s)."""
         drives = zip(self.drives, self.reversed_at.tolist(), strict=True)
-        moved = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in drives]
-        return np.array(moved, float)[self.which] / dt
+        paths = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in drives]
+        return np.array(paths, float)[self.which] / dt
 
-    def reverse(self, t: float, slid: Callable[[int, int], float]) -> None:
-        """Send back those drives whose block has slid far enough; slid(block, base) in m."""
-        for i, d in enumerate(self.drives):
-            if (
-                d.back
-                and t < self.reversed_at[i]
-                and slid(d.back["block"], d.blocks[0]) > d.back["slid"]
-            ):
+    def reverse(self, t: float, slip: Callable[[int, int], float]) -> None:
+        """Reverse the drives whose block has slipped far enough at time t (s).
+
+        slip(block, base): shear displacement (m) of the joint between two blocks.
+        """
+        for i, drive in enumerate(self.drives):
+            condition = drive.reverse
+            if condition is None or t >= self.reversed_at[i]:
+                continue
+            if slip(condition["block"], drive.blocks[0]) > condition["slip"]:
                 self.reversed_at[i] = t
 
 
 def read_drives(
     tables: list[Tables], number: dict[str, int], blocks: list[Block], files: Files, where: str
 ) -> tuple[Drive, ...]:
-    """The drives of `[[drive]]` tables and of the blocks' `held` motions; these blocks are held.
+    """Build the drives of the `[[drive]]` tables and of the fixed motions of blocks.
 
-    number: of each block by name. Fixed blocks move as their drives say and no other way.
-    Raises ValueError.
+    number: index of each block by name. blocks: their `prescribed` motions are completed. A fixed
+    block that a drive moves has no other motion.
+
+    Raises ValueError for keys that do not go together and for a motion that is prescribed twice.
     """
-    drives, rock = [], tuple(i for i, block in enumerate(blocks) if block.fixed)
-    for i, table in enumerate(tables):
-        name, motion = f"{where}: drive[{i}]", table["motion"]
-        moved = rock
-        if "block" in table:
-            moved = (number[one_of(f"{name}.block", table["block"], tuple(number))],)
-        elif motion == "turn" or "back" in table or not rock:
-            raise ValueError(f"{name}.block: name one; without it all fixed rock moves, along x or "
-                             "y and not back")  # fmt: skip
-        given = set(table) - {"block", "motion"}
-        if not any(given <= way for way in WAYS):
-            raise ValueError(
-                f"{name}: {', '.join(sorted(given))} do not go together: give times and values "
-                "(ease, back), or sine, or file (scale, baseline)"
-            )
-        if motion == "turn" and {"file", "sine"} & given:
-            raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
-        if "file" in table:
-            line = read_record(files, f"{name}.file", table)
-        elif "sine" in table:
-            line = _sine(**table["sine"])
-        else:
-            line = _lines(table, number, np.pi / 180 if motion == "turn" else 1.0, name)
-        drives.append(Drive(moved, AXES[motion], **line))
+    fixed_rock = tuple(i for i, block in enumerate(blocks) if block.fixed)
+    drives = [
+        _read_drive(table, number, fixed_rock, files, f"{where}: drive[{i}]")
+        for i, table in enumerate(tables)
+    ]
     driven = [(block, d.axis) for d in drives for block in d.blocks]
-    held = [(i, AXES[name]) for i, b in enumerate(blocks) if not b.fixed for name in b.held]
-    if len({*driven, *held}) < len(driven) + len(held):
+    fixed = [
+        (i, AXES[name])
+        for i, block in enumerate(blocks)
+        if not block.fixed
+        for name in block.prescribed
+    ]
+    if len({*driven, *fixed}) < len(driven) + len(fixed):
         raise ValueError(f"{where}: drive: a motion of a block is prescribed twice")
-    shaken = {block for block, _ in driven if blocks[block].fixed}
-    held += [(i, axis) for i in sorted(shaken) for axis in AXES.values() if (i, axis) not in driven]
+    moving_rock = sorted({block for block, _ in driven if blocks[block].fixed})
+    fixed += [(i, axis) for i in moving_rock for axis in AXES.values() if (i, axis) not in driven]
+    prescribed = {*driven, *fixed}
     for i, block in enumerate(blocks):
-        names = tuple(name for name, axis in AXES.items() if (i, axis) in {*driven, *held})
-        blocks[i] = replace(block, held=names)
-    return *(Drive((i,), axis, (0.0,), (0.0,)) for i, axis in held), *drives
+        names = tuple(name for name, axis in AXES.items() if (i, axis) in prescribed)
+        blocks[i] = replace(block, prescribed=names)
+    return *(Drive((i,), axis, (0.0,), (0.0,)) for i, axis in fixed), *drives
 
 
-def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> dict:
-    """Straight lines between displacements."""
+def _read_drive(
+    table: Tables, number: dict[str, int], fixed_rock: tuple[int, ...], files: Files, name: str
+) -> Drive:
+    """Build the drive of one `[[drive]]` table. Raises ValueError."""
+    motion = table["motion"]
+    blocks = fixed_rock
+    if "block" in table:
+        blocks = (number[one_of(f"{name}.block", table["block"], tuple(number))],)
+    elif motion == "turn" or "reverse" in table or not fixed_rock:
+        raise ValueError(
+            f"{name}.block: name one; without it all fixed rock moves, along x or y and without "
+            "`reverse`"
+        )
+    keys = set(table) - {"block", "motion"}
+    if not any(keys <= group for group in MOTION_KEYS):
+        raise ValueError(
+            f"{name}: {', '.join(sorted(keys))} do not go together: give times and values "
+            "(ramp, reverse), or sine, or file (scale, baseline)"
+        )
+    if motion == "turn" and {"file", "sine"} & keys:
+        raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
+    if "file" in table:
+        path = read_record(files, f"{name}.file", table)
+    elif "sine" in table:
+        path = _sine(**table["sine"])
+    else:
+        path = _polyline(table, number, np.pi / 180 if motion == "turn" else 1.0, name)
+    return Drive(blocks, AXES[motion], **path)
+
+
+def _polyline(table: Tables, number: dict[str, int], unit: float, where: str) -> dict:
+    """Return times, values, ramp and reversal of a drive that is linear between points.
+
+    unit: factor from the unit of the table to SI units.
+    """
     times, values = (np.asarray(table.get(key, ())) for key in ("times", "values"))
-    same = times.ndim == 1 and times.size and times.shape == values.shape
-    if not same or (np.diff(times) <= 0).any():
+    has_pairs = times.ndim == 1 and times.size and times.shape == values.shape
+    if not has_pairs or (np.diff(times) <= 0).any():
         raise ValueError(f"{where}.times: must increase, one for each of `values`")
-    back = table.get("back")
+    reverse = table.get("reverse")
+    if reverse:
+        block = one_of(f"{where}.reverse.block", reverse["block"], tuple(number))
+        reverse = {**reverse, "block": number[block], "by": unit * reverse["by"]}
     return {
-        "times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1),
-        "back": back and {
-            **back, "block": number[one_of(f"{where}.back.block", back["block"], tuple(number))],
-            "by": unit * back["by"],
-        },
-    }  # fmt: skip
+        "times": tuple(times),
+        "values": tuple(unit * values),
+        "ramp": table.get("ramp", DEFAULT_RAMP),
+        "reverse": reverse,
+    }
 
 
 def _sine(acceleration: float, frequency: float, cycles: int = 10) -> dict:
-    """Acceleration as a sine; it rises over a cycle before, and falls after."""
-    phase = np.arange((cycles + 2) * SAMPLES + 1) / SAMPLES  # in cycles
+    """Return a sine of acceleration (m/s2) whose amplitude rises over the cycle before `cycles`
+    full ones and falls over the cycle after them; frequency in 1/s."""
+    phase = np.arange((cycles + 2) * SAMPLES_PER_CYCLE + 1) / SAMPLES_PER_CYCLE  # in cycles
     envelope = np.clip(np.minimum(phase, cycles + 2 - phase), 0.0, 1.0)
     values = acceleration * envelope * np.sin(2 * np.pi * phase)
-    return {"times": tuple((phase / frequency).tolist()), "values": tuple(values.tolist()),
-            "order": 2}  # fmt: skip
+    return {
+        "times": tuple((phase / frequency).tolist()),
+        "values": tuple(values.tolist()),
+        "order": 2,
+    }
 
 
 def read_record(files: Files, name: str, table: Tables) -> Tables:
-    """Times and values of the CSV file of a `[[drive]]` table, as keys of a `Drive`.
+    """Read the CSV file of a `[[drive]]` table; returns the keys of a `Drive`.
 
-    Raises ValueError naming a line that is wrong.
+    name: of the key, for error messages.
+
+    Raises ValueError naming the line that is wrong.
     """
     where = f"{name}: {table['file']}"
     try:
         lines = files[table["file"]].splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{where} cannot be read ({error}); give a CSV file in UTF-8") from None
-    # what a title ends in: time_s, Time (s), Acc [m/s^2]
-    units = [re.split(r"[\s_(\[]", title.strip(" \t\"')]").lower())[-1].replace("^", "")
-             for title in "".join(lines[:1]).split(",")]  # fmt: skip
+    units = [_unit_of(title) for title in "".join(lines[:1]).split(",")]
     if len(units) != 2 or units[0] != "s" or units[1] not in UNITS or len(lines) < 3:
         raise ValueError(
             f"{where}: must be a line such as 'time_s,velocity_m/s' or 'Time (s),Acc (g)', then "
@@ -202,13 +252,22 @@ def read_record(files: Files, name: str, table: Tables) -> Tables:
         raise ValueError(f"{where}, line 2: the first value must be 0, because the blocks rest")
     values *= unit * table.get("scale", 1.0)
     if table.get("baseline") and order:  # a displacement ends at rest in any case
-        values = _at_rest(times, values, order)
-    return {"times": tuple(times.tolist()), "values": tuple(values.tolist()), "order": order,
-            "smooth": order == 0}  # fmt: skip
+        values = _correct_baseline(times, values, order)
+    return {
+        "times": tuple(times.tolist()),
+        "values": tuple(values.tolist()),
+        "order": order,
+        "smooth": order == 0,
+    }
+
+
+def _unit_of(title: str) -> str:
+    """Return the unit at the end of a title such as "time_s", "Time (s)" or "Acc [m/s^2]"."""
+    return re.split(r"[\s_(\[]", title.strip(" \t\"')]").lower())[-1].replace("^", "")
 
 
 def _numbers(lines: list[str], where: str) -> np.ndarray:
-    """Times and values (2, n) of the lines below the first."""
+    """Read times and values (2, n) from the lines below the first."""
     rows: list[tuple[float, float]] = []
     for n, line in enumerate(lines[1:], 2):
         try:
@@ -221,15 +280,17 @@ def _numbers(lines: list[str], where: str) -> np.ndarray:
     return np.transpose(rows)
 
 
-def _at_rest(times: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
-    """Values less a straight line in acceleration (a parabola in velocity), so that the motion ends
-    at rest where it began."""
-    since = times - times[0]
-    parts = since ** (2 - order), since ** (3 - order)
+def _correct_baseline(times: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
+    """Subtract the straight line in acceleration (the parabola in velocity) with which the motion
+    ends at rest at its initial position."""
+    elapsed = times - times[0]
+    corrections = elapsed ** (2 - order), elapsed ** (3 - order)
 
-    def end(column):
+    def final_motion(column):
+        """Velocity and displacement at the end."""
         path = make_interp_spline(times, column, k=1).antiderivative(order)
         return [path(times[-1], nu=1), path(times[-1])]
 
-    share = np.linalg.solve(np.transpose([end(part) for part in parts]), end(values))
-    return values - share @ parts
+    columns = np.transpose([final_motion(correction) for correction in corrections])
+    coefficients = np.linalg.solve(columns, final_motion(values))
+    return values - coefficients @ corrections

@@ -1,4 +1,8 @@
-"""The keys of a scene's tables, each with what it may be: rules of `jointlaw.parameters.keys`."""
+"""The keys of a scene's tables, each with the rule that its value must satisfy.
+
+A rule is a function of the name and the value of a key; it returns the value or raises ValueError.
+Keys that end in "!" are required (`jointlaw.parameters.keys`).
+"""
 
 from collections.abc import Iterable
 from functools import partial
@@ -13,7 +17,7 @@ Tables = dict[str, Any]
 
 
 def of_kind(name: str, value: Any, kind: type) -> Any:
-    """A rule: of this kind."""
+    """Require a value of a type."""
     if not isinstance(value, kind):
         kinds = {str: "a text", bool: "true or false", list: "a list", dict: "a table"}
         raise ValueError(f"{name} = {value!r}: must be {kinds[kind]}")
@@ -21,26 +25,26 @@ def of_kind(name: str, value: Any, kind: type) -> Any:
 
 
 def within(name: str, value: Any, low: float, high: float, unit: str) -> float:
-    """A rule: a number from `low` to `high`."""
+    """Require a number from `low` to `high`."""
     if not low <= number(name, value) <= high:
         raise ValueError(f"{name} = {value!r}: must be from {low:g} to {high:g} {unit}")
     return float(value)
 
 
 def vector(name: str, value: Any) -> tuple[float, float]:
-    """A rule: two finite numbers."""
+    """Require two finite numbers."""
     if not isinstance(value, list) or len(value) != 2:
         raise ValueError(f"{name} = {value!r}: must be two numbers [x, y]")
     return number(name, value[0]), number(name, value[1])
 
 
 def points(name: str, value: Any) -> list[tuple[float, float]]:
-    """A rule: a list of points, in m."""
+    """Require a list of points (m)."""
     return [vector(name, point) for point in LIST(name, value)]
 
 
 def corners(name: str, value: Any) -> np.ndarray:
-    """A rule: the corners (k, 2) of a polygon that does not cross itself, in m."""
+    """Require the corners (k, 2) of a polygon that does not cross itself, in m."""
     ring = np.array(points(name, value))
     if len(ring) < 3 or not Polygon(ring).is_valid:
         raise ValueError(f"{name}: must be 3 corners [x, y] or more that do not cross or touch")
@@ -48,16 +52,16 @@ def corners(name: str, value: Any) -> np.ndarray:
 
 
 def some_of(name: str, value: Any, names: Iterable[str], count: int | None = None) -> list[str]:
-    """A rule: a list of different known names, `count` of them."""
-    ok = isinstance(value, list) and all(isinstance(v, str) and v in names for v in value)
-    if not ok or len(set(value)) < len(value) or count not in (None, len(value)):
-        many = f"{count} of" if count else "some of"
-        raise ValueError(f"{name} = {value!r}: must be {many} {', '.join(names)}, each once")
+    """Require a list of different known names; `count` of them, if given."""
+    is_known = isinstance(value, list) and all(isinstance(v, str) and v in names for v in value)
+    if not is_known or len(set(value)) < len(value) or count not in (None, len(value)):
+        quantity = f"{count} of" if count else "some of"
+        raise ValueError(f"{name} = {value!r}: must be {quantity} {', '.join(names)}, each once")
     return value
 
 
 def polyline(name: str, value: Any) -> np.ndarray:
-    """A rule: points (m, 2) of a line that goes to the right, in m."""
+    """Require points (m, 2) of a line from left to right (m)."""
     line = np.array(points(name, value)).reshape(-1, 2)
     if not len(line) or (np.diff(line[:, 0]) <= 0).any():
         raise ValueError(f"{name}: must be points [x, y] from left to right, x increasing")
@@ -72,7 +76,7 @@ DENSITY = partial(within, low=50.0, high=30000.0, unit="kg/m3; 2.6 g/cm3 is 2600
 BLOCK = {
     "name!": TEXT, "box": vector, "at": vector, "angle": number, "corners": corners,
     "density": DENSITY, "fixed": FLAG, "velocity": vector, "spin": number, "load": vector,
-    "held": partial(some_of, names=AXES),
+    "fixed_motions": partial(some_of, names=AXES),
 }  # fmt: skip
 SET = {
     "dip!": partial(within, low=-90, high=90, unit="degrees"), "spacing!": POSITIVE, "law": TEXT,
@@ -82,13 +86,13 @@ SET = {
 ROCK = {
     "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
     "fixed": [{"corners!": corners}], "hole": [{"corners!": corners}], "density": DENSITY,
-    "seed": partial(integer, bound=0), "least_width": POSITIVE, "laws": TABLE,
+    "seed": partial(integer, bound=0), "min_width": POSITIVE, "laws": TABLE,
     "cut_law": TEXT,
 }  # fmt: skip
 DRIVE = {
-    "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
+    "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ramp": NOT_NEGATIVE,
     "times": partial(finite, unit="s"), "values": partial(finite, unit="m or degrees"),
-    "back": {"block!": TEXT, "slid!": POSITIVE, "by!": number, "over!": POSITIVE},
+    "reverse": {"block!": TEXT, "slip!": POSITIVE, "by!": number, "duration!": POSITIVE},
     "sine": {
         "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(integer, bound=1),
     },
@@ -96,32 +100,31 @@ DRIVE = {
 }  # fmt: skip
 RUN = {
     "end!": POSITIVE, "fraction": partial(within, low=1e-6, high=0.95, unit="of the limit"),
-    "step": POSITIVE,
-    "seat": FLAG, "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
-    "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
-    "skin": POSITIVE, "corner_length": POSITIVE,
-    "max_overlap": POSITIVE,
+    "step": POSITIVE, "settle": FLAG, "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
+    "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1), "skin": POSITIVE,
+    "corner_length": POSITIVE, "max_overlap": POSITIVE,
 }  # fmt: skip
 SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
-    "excavate": [{"corners!": corners, "at": NOT_NEGATIVE, "over!": POSITIVE}],
+    "excavate": [{"corners!": corners, "start": NOT_NEGATIVE, "release_time!": POSITIVE}],
     "in_situ": {
         "k0": NOT_NEGATIVE, "stress": partial(finite, unit="Pa"), "surface": polyline,
         **dict.fromkeys(("left", "right", "bottom", "top"),
-                        partial(one_of, choices=("held", "rollers", "loaded"))),
+                        partial(one_of, choices=("fixed", "rollers", "loaded"))),
     },
     "water": {"table!": polyline, "unit_weight": POSITIVE},
-    "watch": {"slip": LIST, "shear": LIST, "pins": points, "joints": points},
+    "monitor": {"slip": LIST, "shear": LIST, "points": points, "joints": points},
 }  # fmt: skip
 
 
 def overlay(below: Any, above: Any) -> Any:
-    """Tables are joined key by key, lists of tables table by table; all else is replaced."""
+    """Lay one value over another: tables are merged key by key, lists of tables table by table;
+    any other value of `above` replaces that of `below`."""
     if isinstance(above, dict) and isinstance(below, dict):
         return below | {key: overlay(below.get(key), value) for key, value in above.items()}
     if isinstance(below, list) and all(isinstance(table, dict) for table in (*below, *above)):
-        joined = [overlay(*pair) for pair in zip(below, above, strict=False)]
-        return joined + below[len(joined) :] + above[len(joined) :]
+        merged = [overlay(*pair) for pair in zip(below, above, strict=False)]
+        return merged + below[len(merged) :] + above[len(merged) :]
     return above

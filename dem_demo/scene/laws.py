@@ -10,15 +10,15 @@ from jointlaw.parameters.rock import require_rock
 from .keys import TABLE, Tables, overlay
 
 Law = jl.JointLaw | jl.CoulombLaw
-WHOLE = "whole rock"  # name of the law of cuts that are no joints
-USUAL = 1e5  # Pa: normal stress of a joint where it is not known
-STRONG = 1e3  # cohesion of whole rock over its tension
+INTACT_ROCK = "intact rock"  # name of the law of cuts that are no joints
+TYPICAL_STRESS = 1e5  # Pa: normal stress of a joint where it is unknown
+COHESION_PER_TENSION = 1e3  # of intact rock
 
 
 class Files(dict[str, str]):
-    """Texts of the files that a scene names, by their names; read from `folder` when first used.
+    """Contents of the files that a scene names, by name; each is read when it is first used.
 
-    A name is a path relative to the scene's file.
+    folder: of the scene file, which names are relative to. known: contents that are not read.
     """
 
     def __init__(self, folder: str | Path = "", known: dict[str, str] | None = None) -> None:
@@ -30,11 +30,13 @@ class Files(dict[str, str]):
 
 
 def build_law(data: Tables, where: str, files: Files) -> Law:
-    """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb". Its keys
-    are laid over those of the law that it is `from`, by name or from a file. Its `pressure` is that
-    of water in the joints, no part of the law.
+    """Build a law from a `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb".
 
-    Raises ValueError.
+    With `from`, the name of a preset or a parameter file, the keys of the table are laid over the
+    keys of that law. The water `pressure` in the joints is not a part of the law. where: name of
+    the table, for error messages.
+
+    Raises ValueError naming the key.
     """
     if TABLE(where, data).get("closure_only"):
         raise ValueError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
@@ -56,19 +58,21 @@ def build_law(data: Tables, where: str, files: Files) -> Law:
 
 
 def springs(law: Law, stress: float) -> tuple[float, float]:
-    """Stiffnesses in closure and shear (Pa/m): of a joint law that is closed by a stress (Pa)."""
+    """Secant stiffnesses in closure and in shear (Pa/m) at a normal stress (Pa)."""
     if isinstance(law, jl.CoulombLaw):
         return law.normal_stiffness, law.shear_stiffness
     stiffness = float(stress / law.closure(stress))
     return stiffness, stiffness / law.asperity.lam
 
 
-def whole_rock(laws: Iterable[Law], opening: float) -> jl.CoulombLaw:
-    """A joint as stiff as the stiffest of some laws at the usual stress, which holds until it is
-    open by `opening` (m)."""
-    normal, shear = max(springs(law, USUAL) for law in laws)
+def intact_rock_law(laws: Iterable[Law], opening: float) -> jl.CoulombLaw:
+    """Build the law of a cut that is no joint, as stiff as the stiffest of some laws.
+
+    opening: distance (m) at which its tension breaks.
+    """
+    normal, shear = max(springs(law, TYPICAL_STRESS) for law in laws)
     tension = normal * opening
-    return jl.CoulombLaw(normal, shear, 1.0, STRONG * tension, tension, plane=0.0)
+    return jl.CoulombLaw(normal, shear, 1.0, COHESION_PER_TENSION * tension, tension, plane=0.0)
 
 
 def opens_to(law: Law) -> float:

@@ -1,4 +1,4 @@
-"""Reads scenes: TOML files, or their text, checked."""
+"""Read scenes from TOML files or text, and validate them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -11,97 +11,109 @@ from shapely import Point, Polygon
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
-from .blocks import EXACT, Block, box, check_convex, usual_width
-from .cutting import CUT, JointSet, cut
+from .blocks import LENGTH_TOLERANCE, Block, box, find_shape_error, median_width
+from .cutting import INWARD_CUT, JointSet, cut
 from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of
-from .laws import WHOLE, Files, build_law, opens_to, whole_rock
-from .scene import SKIN, Rock, Run, Scene, Stress
+from .laws import INTACT_ROCK, Files, Law, build_law, intact_rock_law, opens_to
+from .scene import SKIN_PER_MEDIAN_WIDTH, Rock, Run, Scene, Stress
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
-UNIT_WEIGHT = 9810.0  # N/m3, of water
+WATER_UNIT_WEIGHT = 9810.0  # N/m3
 SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
-DEFAULTS = {  # of a scene that says nothing else; m/s2, kg/m3, m
-    "gravity": (0.0, -9.81), "density": 2600.0, "thickness": 1.0, "watch": {},
+DEFAULTS = {  # of the top level; m/s2, kg/m3, m
+    "gravity": (0.0, -9.81), "density": 2600.0, "thickness": 1.0, "monitor": {},
     **dict.fromkeys(("block", "rock", "drive", "joint", "excavate"), ()),
 }  # fmt: skip
-CORNER = 0.1  # of the least width of a block
-SOFT = 0.25  # of the skin, that of the narrowest block where none is given
-SLIVER = 0.7  # of the usual width: narrower blocks do not count
-HELD = 0.5  # of the skin that whole rock may open
-LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
+CORNER_LENGTH_PER_WIDTH = 0.1  # of the narrowest block
+SOFT_PER_SKIN = 0.25  # of the skin of the narrowest block
+SLIVER_PER_WIDTH = 0.7  # of the median width: narrower blocks do not reduce the corner length
+INTACT_OPENING_PER_SKIN = 0.5  # opening at which intact rock breaks
+MIN_WIDTH_PER_SPACING = 0.2  # of the smallest spacing: narrower blocks of a rock are slivers
 
 
 def shipped() -> dict[str, tuple[Path, str]]:
-    """Scenes that come with the package: SCENE, and SCENE-VARIANT for each of its variants.
+    """List the scenes of the package: SCENE, and SCENE-VARIANT for each of its variants.
 
-    By name: the file, and the line that chooses the variant.
+    Returns by name the file, and the line that chooses the variant.
     """
-    found = {}
+    scenes = {}
     for path in sorted(SCENES.glob("*.toml")):
-        found[path.stem] = path, ""
+        scenes[path.stem] = path, ""
         for variant in keys.read(path).get("variants", {}):
-            found[f"{path.stem}-{variant}"] = path, f'variant = "{variant}"\n'
-    return found
+            scenes[f"{path.stem}-{variant}"] = path, f'variant = "{variant}"\n'
+    return scenes
 
 
 def load(source: str | Path) -> Scene:
-    """A scene by name, or from a TOML file. Raises ValueError."""
-    path, chosen = shipped().get(source, (Path(source), ""))
+    """Read a scene of the package by name, or a TOML file. Raises ValueError."""
+    path, variant_line = shipped().get(source, (Path(source), ""))
     if not path.is_file():
         raise ValueError(
             f"no scene {str(source)!r}: {remedy(source, shipped(), 'give a TOML file or one of')}"
         )
     try:
-        return parse(chosen + path.read_text(encoding="utf-8"), path.name, Files(path.parent))
+        text = variant_line + path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path} is not UTF-8 text: {error}") from None
+    return parse(text, path.name, Files(path.parent))
 
 
 def parse(text: str, where: str = "scene", files: Files | None = None) -> Scene:
-    """A scene from TOML text; `where` is named in error messages. Raises ValueError.
+    """Read a scene from TOML text.
 
-    files: those that it names, by default read from the working folder.
+    where: name of the scene in error messages. files: contents of the files that it names, by
+    default read from the working directory.
+
+    Raises ValueError.
     """
     return build(read_tables(text, where), where, files, text)
 
 
 def read_tables(text: str, where: str = "scene") -> Tables:
-    """The tables of a scene's text: its `variant` laid over them, rocks with the keys that they
-    copy. Raises ValueError."""
+    """Return the tables of a scene's text, with its `variant` laid over them and the keys of rocks
+    that are `like` another one. Raises ValueError."""
     data = keys.parse(text, where)
     if "asperity_density" in data or "kind" in data:
         raise ValueError(f"{where} is the parameter file of a law, no scene: in a scene write "
                          f"[laws.NAME] with from = {where!r}")  # fmt: skip
-    variants, chosen = data.pop("variants", {}), data.pop("variant", None)
-    if chosen is not None:
-        data = overlay(data, variants[one_of(f"{where}: variant", chosen, tuple(variants))])
-    return {**data, "rock": [*_copied(data.get("rock", []), where)]}
+    variants = data.pop("variants", {})
+    variant = data.pop("variant", None)
+    if variant is not None:
+        data = overlay(data, variants[one_of(f"{where}: variant", variant, tuple(variants))])
+    return {**data, "rock": [*_copy_rocks(data.get("rock", []), where)]}
 
 
-def _copied(rocks: Any, where: str) -> Iterator[Tables]:
-    """Tables of rocks, each with the keys of the rock that it is `like`."""
-    known: dict[str, Tables] = {}
+def _copy_rocks(rocks: Any, where: str) -> Iterator[Tables]:
+    """Yield tables of rocks, each with the keys of the rock that it is `like`."""
+    tables: dict[str, Tables] = {}
     for i, table in enumerate(LIST(f"{where}: rock", rocks)):
         place = f"{where}: rock[{i}]"
-        own, name = {**TABLE(place, table)}, str(table.get("name"))
-        if like := own.pop("like", None):
-            if like not in list(known):
+        rock = {**TABLE(place, table)}
+        name = str(table.get("name"))
+        if like := rock.pop("like", None):
+            if like not in list(tables):
                 raise ValueError(f"{place}.like = {like!r}: no rock further up; "
-                                 f"{remedy(like, known)}")  # fmt: skip
-            own = {**known[like], **own}
-        known[name] = own
-        yield own
+                                 f"{remedy(like, tables)}")  # fmt: skip
+            rock = {**tables[like], **rock}
+        tables[name] = rock
+        yield rock
 
 
 def build(data: Tables, where: str = "scene", files: Files | None = None, text: str = "") -> Scene:
-    """A scene from the tables of its file and the files that it names. Raises ValueError."""
-    top, files = DEFAULTS | keys.checked(data, SCENE, where), Files() if files is None else files
-    laws = {name: build_law(table, f"{where}: laws.{name}", files)
-            for name, table in top["laws"].items()}  # fmt: skip
-    pressure = {name: NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table["pressure"])
-                for name, table in top["laws"].items() if "pressure" in table}  # fmt: skip
+    """Build a scene from the tables of its file and the files that it names. Raises ValueError."""
+    files = Files() if files is None else files
+    top = DEFAULTS | keys.checked(data, SCENE, where)
+    laws = {
+        name: build_law(table, f"{where}: laws.{name}", files)
+        for name, table in top["laws"].items()
+    }
+    pressure = {
+        name: NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table["pressure"])
+        for name, table in top["laws"].items()
+        if "pressure" in table
+    }
     default = top.setdefault("law", next(iter(laws), ""))
     blocks = [_block(table, top["density"], where) for table in top["block"]]
     edge_laws: dict[tuple[int, int], str] = {}
@@ -114,191 +126,245 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         raise ValueError(f"{where}: no block can move; give [[block]] or [[rock]], not all fixed")
     drives = read_drives(top["drive"], number, blocks, files, where)
     pairs = _pairs(top["joint"], number, blocks, where)
-    least, skin = min(block.width for block in blocks), top["run"].get("skin")
-    lengths = {"corner_length": CORNER * max(least, SLIVER * usual_width(blocks)),
-               "soft": SOFT * (skin or SKIN * least)}  # fmt: skip
-    run = Run(**lengths | top["run"])
-    watched = _watched(top["watch"], number, blocks, run.corner_length, f"{where}: watch")
-    jointed = {*edge_laws.values()} - {WHOLE}
-    for law in [default, *pairs.values(), *sorted(jointed)]:
+    run = _run(top["run"], blocks)
+    monitors = _monitors(top["monitor"], number, blocks, run.corner_length, f"{where}: monitor")
+    joint_laws = {*edge_laws.values()} - {INTACT_ROCK}
+    for law in [default, *pairs.values(), *sorted(joint_laws)]:
         one_of(f"{where}: law", law, tuple(laws))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
         edge_laws, drives, top["gravity"], top["thickness"], water, in_situ, pressure,
-        tuple(_stages(top["excavate"], blocks, where)), **watched,
+        tuple(_stages(top["excavate"], blocks, where)), **monitors,
     )  # fmt: skip
-    if WHOLE in edge_laws.values():
-        joints = [laws[law] for law in jointed or [default]]
-        laws.setdefault(WHOLE, whole_rock(joints, HELD * scene.skins.min()))
-    for name, law in laws.items():
-        if (opening := opens_to(law)) > scene.skins.min():
-            raise ValueError(
-                f"{where}: laws.{name} holds until the joint is {opening:.3g} m open, but "
-                f"contacts are followed to {scene.skins.min():.3g} m: set a larger run.skin, or "
-                "a smaller tension or energy_I"
-            )
-    for name, value in (("files", files), ("text", text)):  # `replace` leaves both out
+    skin = scene.skins.min()
+    if INTACT_ROCK in edge_laws.values():
+        joints = [laws[law] for law in joint_laws or [default]]
+        laws.setdefault(INTACT_ROCK, intact_rock_law(joints, INTACT_OPENING_PER_SKIN * skin))
+    _require_openings(laws, skin, where)
+    for name, value in (("files", files), ("text", text)):  # not copied by `replace`
         object.__setattr__(scene, name, value)
     return scene
 
 
+def _run(table: Tables, blocks: Sequence[Block]) -> Run:
+    """Build the settings of a run; lengths that the table does not give follow from the blocks."""
+    narrowest = min(block.width for block in blocks)
+    width = max(narrowest, SLIVER_PER_WIDTH * median_width(blocks))
+    skin = table.get("skin") or SKIN_PER_MEDIAN_WIDTH * narrowest
+    lengths = {"corner_length": CORNER_LENGTH_PER_WIDTH * width, "soft": SOFT_PER_SKIN * skin}
+    return Run(**lengths | table)
+
+
+def _require_openings(laws: dict[str, Law], skin: float, where: str) -> None:
+    """Require that the contact of a joint is kept until its tension breaks. Raises ValueError."""
+    for name, law in laws.items():
+        opening = opens_to(law)
+        if opening > skin:
+            raise ValueError(
+                f"{where}: laws.{name} holds until the joint is {opening:.3g} m open, but "
+                f"contacts are followed to {skin:.3g} m: set a larger run.skin, or "
+                "a smaller tension or energy_I"
+            )
+
+
 def _block(table: Tables, density: float, where: str) -> Block:
-    name, drawn = f"{where}: block[{table['name']!r}]", {"corners", "box", "at", "angle"} & {*table}
-    if drawn != {"corners"} and ("box" not in drawn or "corners" in drawn):
+    """Build a block from its table; density (kg/m3): of the scene. Raises ValueError."""
+    name = f"{where}: block[{table['name']!r}]"
+    shape_keys = {"corners", "box", "at", "angle"} & {*table}
+    if shape_keys != {"corners"} and ("box" not in shape_keys or "corners" in shape_keys):
         raise ValueError(f"{name}: give `corners` alone, or `box` with `at` and `angle`")
     if "box" in table:
-        at, angle = table.pop("at", (0.0, 0.0)), table.pop("angle", 0.0)
-        table["corners"] = box(*table.pop("box"), at, angle)
+        center = table.pop("at", (0.0, 0.0))
+        angle = table.pop("angle", 0.0)
+        table["corners"] = box(*table.pop("box"), center, angle)
     if table.get("fixed") and {"velocity", "spin"} & {*table}:
         raise ValueError(f"{name}: a fixed block has no velocity or spin; let a [[drive]] move it")
-    if trouble := check_convex(table["corners"]):
-        raise ValueError(f"{name}.corners (or box) {trouble}")
-    return Block(**{"density": density, **table, "held": tuple(table.get("held", ()))})
+    if error := find_shape_error(table["corners"]):
+        raise ValueError(f"{name}.corners (or box) {error}")
+    fixed_motions = tuple(table.pop("fixed_motions", ()))
+    return Block(**{"density": density, **table, "prescribed": fixed_motions})
 
 
 def _stresses(top: Tables, blocks: list[Block], where: str) -> tuple[Stress | None, Stress | None]:
-    """The stresses of the tables `[water]` and `[in_situ]` of a scene.
+    """Build the stresses of the tables `[water]` and `[in_situ]` of a scene.
 
-    Blocks on its sides are fixed or held as `[in_situ]` says. On a side that the stress loads there
-    is no water, which is part of the stress. Raises ValueError.
+    blocks: blocks on the sides are fixed or get rollers as `[in_situ]` says. Edges that the in-situ
+    stress loads from outside carry no water pressure, because that stress is the total one.
+
+    Raises ValueError.
     """
-    water, given, gravity = top.get("water"), top.get("in_situ", {}), top["gravity"]
-    stress = np.ravel(given.get("stress", ()))
-    if "in_situ" in top and ("k0" in given, len(stress)) not in ((True, 0), (False, 3)):
+    water = top.get("water")
+    table = top.get("in_situ", {})
+    gravity = top["gravity"]
+    stress = np.ravel(table.get("stress", ()))
+    if "in_situ" in top and ("k0" in table, len(stress)) not in ((True, 0), (False, 3)):
         raise ValueError(f"{where}: in_situ: give either k0 or stress = [sxx, syy, sxy]")
-    if (water or "k0" in given) and (gravity[0] or gravity[1] > 0):
+    if (water or "k0" in table) and (gravity[0] or gravity[1] > 0):
         raise ValueError(f"{where}: gravity = {list(gravity)} must point down, [0, -9.81], for a "
                          "water table and for k0")  # fmt: skip
     corners = np.concatenate([block.corners for block in blocks])
-    loaded = _sides(given, blocks, corners)
+    loaded = _apply_sides(table, blocks, corners)
     if water:
-        water = Stress(
-            np.eye(2), water["table"], water.get("unit_weight", UNIT_WEIGHT), 0.0, ~loaded
-        )
-    if not given:
+        unit_weight = water.get("unit_weight", WATER_UNIT_WEIGHT)
+        water = Stress(np.eye(2), water["table"], unit_weight, 0.0, ~loaded)
+    if not table:
         return water, None
-    uniform, line = len(stress) > 0, given.get("surface", [[0.0, corners[:, 1].max()]])
-    x, y, shear = stress if uniform else (given["k0"], 1.0, 0.0)
-    weight, tensor = -top["density"] * gravity[1], np.array([[x, shear], [shear, y]])
-    return water, Stress(tensor, np.array(line), weight * (not uniform), float(uniform), loaded)
+    is_uniform = len(stress) > 0
+    line = np.array(table.get("surface", [[0.0, corners[:, 1].max()]]))
+    x, y, shear = stress if is_uniform else (table["k0"], 1.0, 0.0)
+    tensor = np.array([[x, shear], [shear, y]])
+    weight = -top["density"] * gravity[1] * (not is_uniform)
+    return water, Stress(tensor, line, weight, float(is_uniform), loaded)
 
 
-def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
-    """Hold the blocks on the sides of a scene as `[in_situ]` says; which edges (c,) are loaded."""
+def _apply_sides(table: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
+    """Fix the blocks on the sides of a scene as `[in_situ]` says.
+
+    corners (c, 2): of all blocks in order. Returns whether each edge (c,) is loaded from outside.
+    """
     number = np.repeat(np.arange(len(blocks)), [len(block.corners) for block in blocks])
     ends = np.concatenate([np.roll(block.corners, -1, axis=0) for block in blocks])
     loaded = np.zeros(len(corners), bool)
-    for side, (axis, way) in SIDES.items():
-        reach, kind = way * np.stack([corners, ends])[..., axis], given.get(side)
-        on = (reach > reach.max() - EXACT * np.ptp(corners)).all(axis=0)
-        loaded |= on & (kind == "loaded")
-        for i in np.unique(number[on & (kind in ("held", "rollers"))]).tolist():
-            fixed, held = blocks[i].fixed or kind == "held", {*blocks[i].held, "xy"[axis], "turn"}
-            blocks[i] = replace(blocks[i], fixed=fixed, held=() if fixed else tuple(sorted(held)))
+    for side, (axis, sign) in SIDES.items():
+        kind = table.get(side)
+        outward = sign * np.stack([corners, ends])[..., axis]
+        tolerance = LENGTH_TOLERANCE * np.ptp(corners)
+        on_side = (outward > outward.max() - tolerance).all(axis=0)
+        loaded |= on_side & (kind == "loaded")
+        for i in np.unique(number[on_side & (kind in ("fixed", "rollers"))]).tolist():
+            fixed = blocks[i].fixed or kind == "fixed"
+            motions = {*blocks[i].prescribed, "xy"[axis], "turn"}
+            prescribed = () if fixed else tuple(sorted(motions))
+            blocks[i] = replace(blocks[i], fixed=fixed, prescribed=prescribed)
     return loaded
 
 
 def _pairs(
     tables: list[Tables], number: dict[str, int], blocks: Sequence[Block], where: str
 ) -> dict[frozenset, str]:
-    """Laws named by [[joint]] tables, for two blocks or for all joints of one."""
+    """Return the laws of `[[joint]]` tables by two blocks, or by one for all of its joints."""
     pairs: dict[frozenset, str] = {}
     for i, table in enumerate(tables):
         name = f"{where}: joint[{i}]"
         if "around" in table:
-            meant = [_block_at(f"{name}.around", table["around"], blocks)]
+            numbers = [_block_at(f"{name}.around", table["around"], blocks)]
         else:
-            two = some_of(f"{name}.between", table.get("between"), number, 2)
-            meant = [number[block] for block in two]
-        if pairs.setdefault(frozenset(meant), table["law"]) != table["law"]:
+            names = some_of(f"{name}.between", table.get("between"), number, 2)
+            numbers = [number[block] for block in names]
+        if pairs.setdefault(frozenset(numbers), table["law"]) != table["law"]:
             raise ValueError(f"{name}: another [[joint]] gives these blocks another law")
     return pairs
 
 
 def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) -> int:
+    """Return the number of the movable block that contains a point (m). Raises ValueError."""
     for i, block in enumerate(blocks):
         if not block.fixed and Polygon(block.corners).contains(Point(point)):
             return i
     raise ValueError(f"{name} = {list(point)}: must lie inside a block that can move")
 
 
-def _watched(
+def _monitors(
     table: Tables, number: dict[str, int], blocks: Sequence[Block], reach: float, where: str
 ) -> dict[str, tuple[Any, ...]]:
-    watched: dict[str, tuple[Any, ...]] = {}
+    """Return the fields of a `Scene` that the `[monitor]` table gives.
+
+    reach: largest gap (m) of a monitored joint. Raises ValueError.
+    """
+    pairs: dict[str, tuple[Any, ...]] = {}
     for kind in ("slip", "shear"):
-        pairs = [some_of(f"{where}.{kind}", pair, number, 2) for pair in table.get(kind, ())]
-        watched[kind] = tuple((number[moving], number[base]) for moving, base in pairs)
-    joints = {*watched["slip"], *watched["shear"]}
+        names = [some_of(f"{where}.{kind}", pair, number, 2) for pair in table.get(kind, ())]
+        pairs[kind] = tuple((number[moving], number[base]) for moving, base in names)
+    joints = {*pairs["slip"], *pairs["shear"]}
     if len({moving for moving, _ in joints}) < len(joints):
-        raise ValueError(f"{where}: slip and shear watch one block on two bases; name one")
-    pins = ((_block_at(f"{where}.pins", at, blocks), at) for at in table.get("pins", ()))
-    near = (_joint_at(f"{where}.joints", at, blocks, reach) for at in table.get("joints", ()))
-    return watched | {"pins": tuple(pins), "near": tuple(near)}
+        raise ValueError(f"{where}: slip and shear monitor one block on two bases; name one")
+    points = [
+        (_block_at(f"{where}.points", point, blocks), point) for point in table.get("points", ())
+    ]
+    point_joints = [
+        _joint_at(f"{where}.joints", point, blocks, reach) for point in table.get("joints", ())
+    ]
+    return pairs | {"points": tuple(points), "point_joints": tuple(point_joints)}
 
 
 def _joint_at(
     name: str, point: tuple[float, float], blocks: Sequence[Block], reach: float
 ) -> tuple[int, int]:
-    """The two blocks nearest to a point, in the order of the scene."""
-    away = [Polygon(block.corners).distance(Point(point)) for block in blocks]
-    two = sorted(np.argsort(away, kind="stable")[:2].tolist())
-    shapes = [Polygon(blocks[i].corners) for i in two]
-    if len(two) < 2 or shapes[0].distance(shapes[1]) > reach or all(blocks[i].fixed for i in two):
+    """Return the two blocks nearest to a point (m), in the order of the scene.
+
+    Raises ValueError where their gap is larger than `reach` (m) or neither of them can move.
+    """
+    distances = [Polygon(block.corners).distance(Point(point)) for block in blocks]
+    nearest = sorted(np.argsort(distances, kind="stable")[:2].tolist())
+    shapes = [Polygon(blocks[i].corners) for i in nearest]
+    is_joint = len(nearest) == 2 and shapes[0].distance(shapes[1]) <= reach
+    if not is_joint or all(blocks[i].fixed for i in nearest):
         raise ValueError(f"{name} = {list(point)}: must lie at a joint of a block that can move")
-    return two[0], two[1]
+    return nearest[0], nearest[1]
 
 
 def _stages(tables: list[Tables], blocks: Sequence[Block], where: str) -> Iterator[Tables]:
-    """The stages of an excavation: each takes the blocks whose centroids lie in its corners."""
-    left = dict(enumerate(Point(block.centroid) for block in blocks))
+    """Yield excavation stages; each removes the blocks whose centroids lie within its corners."""
+    remaining = {i: Point(block.centroid) for i, block in enumerate(blocks)}
     for i, table in enumerate(tables):
         region = Polygon(table["corners"])
-        taken = [j for j, at in left.items() if region.contains(at)]
-        if not taken:
+        removed = [j for j, centroid in remaining.items() if region.contains(centroid)]
+        if not removed:
             raise ValueError(f"{where}: excavate[{i}].corners: no block is left there")
-        left = {j: at for j, at in left.items() if j not in taken}
-        yield {"at": None, **table, "blocks": taken}
+        for j in removed:
+            del remaining[j]
+        yield {"start": None, **table, "blocks": removed}
 
 
 def _rock(
     table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], top: Tables, where: str
 ) -> Rock:
-    """Cut a rock, and add its blocks and the laws of their edges to those of the scene; top: the
-    scene's tables, for what the rock does not say. Which blocks can move is left open."""
-    name, where = table["name"], f"{where}: rock[{table['name']!r}]"
+    """Cut a rock mass; its blocks are appended to `blocks`, the laws of its edges to `laws`.
+
+    top: tables of the scene, for defaults. The list of movable blocks is left empty.
+
+    Raises ValueError.
+    """
+    name = table["name"]
+    where = f"{where}: rock[{name!r}]"
     sets = [JointSet(**{"law": top["law"], **part}) for part in table["set"]]
-    shift, other = np.array(table.get("at", (0.0, 0.0))), table.get("laws", {})
-    fixed = [Polygon(part["corners"]) for part in table.get("fixed", ())]
-    wide = min([float(np.ptp(table["outline"], axis=0).min()), *(s.spacing for s in sets)])
-    least = table.get("least_width", LEAST * wide * bool(sets))
-    if unknown := set(other) - {s.law for s in sets}:
+    replaced_laws = table.get("laws", {})
+    if unknown := set(replaced_laws) - {s.law for s in sets}:
         raise ValueError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
+    shift = np.array(table.get("at", (0.0, 0.0)))
+    extent = float(np.ptp(table["outline"], axis=0).min())
+    spacing = min([extent, *(s.spacing for s in sets)])
+    min_width = table.get("min_width", MIN_WIDTH_PER_SPACING * spacing * bool(sets))
+    holes = [part["corners"] for part in table.get("hole", ())]
+    regions = [part["corners"] - shift for part in top["excavate"]]
     try:
-        holes = [part["corners"] for part in table.get("hole", ())]
-        regions = [part["corners"] - shift for part in top["excavate"]]
-        shapes, numbers, joined, dropped = cut(
-            table["outline"], sets, table.get("seed", 0), least, holes, regions
-        )
+        pieces = cut(table["outline"], sets, table.get("seed", 0), min_width, holes, regions)
     except ValueError as error:
         raise ValueError(f"{where}.outline: {error}") from None
-    if not shapes:
+    if not pieces.shapes:
         raise ValueError(
-            f"{where}: all blocks would be slivers: give a least_width below {least:.3g} m"
+            f"{where}: all blocks would be slivers: give a min_width below {min_width:.3g} m"
         )
-    first, names = len(blocks), [other.get(s.law, s.law) for s in sets]
-    of_edge = dict(enumerate(names)) | {CUT: table.get("cut_law", WHOLE)}
-    for i, (shape, of) in enumerate(zip(shapes, numbers, strict=True)):
-        block = Block(f"{name} {i + 1}", shape + shift, table.get("density", top["density"]))
-        stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
-        blocks.append(replace(block, fixed=stays))
-        laws.update(((first + i, edge), of_edge[number])
-                    for edge, number in enumerate(of.tolist()) if number >= 0)  # fmt: skip
-    cuts = sum(int((of == CUT).sum()) for of in numbers) // 2
-    return Rock(name, range(first, len(blocks)), [], [
-        f"{joined} slivers joined to neighbours",
-        *(f"a gap of {sliver.area:.2g} m2 at ({sliver.centroid.x + shift[0]:.3g}, "
-          f"{sliver.centroid.y + shift[1]:.3g}), a sliver left out" for sliver in dropped),
-        *[f"{cuts} cuts that are no joints, at inward corners: law {of_edge[CUT]!r}"] * (cuts > 0),
-    ])  # fmt: skip
+    first = len(blocks)
+    cut_law = table.get("cut_law", INTACT_ROCK)
+    law_of_set = {i: replaced_laws.get(s.law, s.law) for i, s in enumerate(sets)}
+    law_of_set[INWARD_CUT] = cut_law
+    fixed_regions = [Polygon(part["corners"]) for part in table.get("fixed", ())]
+    for i, (corners, sets_of_edges) in enumerate(zip(pieces.shapes, pieces.edge_sets, strict=True)):
+        density = table.get("density", top["density"])
+        block = Block(f"{name} {i + 1}", corners + shift, density)
+        centroid = Point(block.centroid - shift)
+        fixed = any(region.contains(centroid) for region in fixed_regions)
+        blocks.append(replace(block, fixed=fixed))
+        for edge, number in enumerate(sets_of_edges.tolist()):
+            if number >= 0:
+                laws[first + i, edge] = law_of_set[number]
+    messages = [f"{pieces.merged} slivers merged with neighbours"]
+    for sliver in pieces.dropped:
+        x, y = sliver.centroid.x + shift[0], sliver.centroid.y + shift[1]
+        messages.append(f"a gap of {sliver.area:.2g} m2 at ({x:.3g}, {y:.3g}), a sliver left out")
+    cuts = sum(int((numbers == INWARD_CUT).sum()) for numbers in pieces.edge_sets) // 2
+    if cuts:
+        messages.append(f"{cuts} cuts at inward corners that are no joints: law {cut_law!r}")
+    return Rock(name, range(first, len(blocks)), [], messages)

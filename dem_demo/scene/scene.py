@@ -1,50 +1,54 @@
-"""A scene in memory: blocks, laws, drives, stress in the ground, and how to run them."""
+"""A scene in memory: blocks, laws, drives, stress in the ground, and settings of a run."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from .blocks import Block, usual_width
+from .blocks import Block, median_width
 from .drives import Drive
 from .keys import Tables
 from .laws import Files, Law
 
-SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
+SKIN_PER_MEDIAN_WIDTH = 0.02  # of the blocks that move
+MAX_SKIN_PER_WIDTH = 0.1  # of a block's own width
 
 
-class Refused(RuntimeError):
-    """A state that the method cannot carry; the run leaves a snapshot that replays it."""
+class SceneError(RuntimeError):
+    """A state that the method cannot continue from, such as a block that moves too far in a step.
+
+    The last valid state is saved, so that the run can be resumed with a smaller time step.
+    """
 
 
 @dataclass(frozen=True)
 class Run:
-    """How to run a scene; times in s, lengths in m."""
+    """Settings of a run; times in s, lengths in m."""
 
     end: float
-    corner_length: float  # of joint at a corner on an edge
-    soft: float  # over which the end of one edge gives way to that of another
-    skin: float | None = None  # reach of the search for contacts; `Scene.skins` without it
-    fraction: float | None = None  # time step as a share of the limit; None: by what can happen
+    corner_length: float  # of the joint at a corner that lies on an edge
+    soft: float  # over which a contact passes from the end of one edge to the next
+    skin: float | None = None  # range of contact detection; None: `Scene.skins` has a default
+    fraction: float | None = None  # time step over the stability limit; None: chosen by the scene
     step: float | None = None  # or the time step itself
-    seat: bool = True  # start at the gravity closure
+    settle: bool = True  # start in static equilibrium
     record: float = 0.05  # time between records
-    dashpot_normal: float = 0.05  # shares of critical
+    dashpot_normal: float = 0.05  # fractions of critical damping
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step; 2 for impacts
-    max_overlap: float = 0.1  # share of the smaller block's width
+    max_overlap: float = 0.1  # fraction of the smaller block's width
 
 
 @dataclass(frozen=True, eq=False)
 class Stress:
-    """Stress that is given in the ground: of water in joints, or of the rock before an excavation.
+    """A given stress: of the water in joints, or of the rock before an excavation.
 
-    A tensor times a number that grows with the depth below a line, at least 0; their product is
-    in Pa.
+    The stress is a tensor times a scalar profile that grows linearly with the depth below a line.
+    The profile counts as zero where it is negative.
 
-    tensor (2, 2), compression positive; line (m, 2): [x, y] (m) of the line, level beyond its ends;
-    weight: growth of the number per m of depth; top: the number on the line; edges (c,): those of
-    all blocks, one after the other, that the stress acts on from outside.
+    tensor (2, 2): compression positive. line (m, 2): points [x, y] (m), level beyond its ends.
+    weight: growth of the profile per m of depth. top: profile on the line. Tensor times profile is
+    in Pa. edges (c,): whether the stress loads each edge of all blocks from outside.
     """
 
     tensor: np.ndarray
@@ -54,11 +58,11 @@ class Stress:
     edges: np.ndarray
 
     def signed(self, at: np.ndarray) -> np.ndarray:
-        """The number at places x + iy (m), below zero where it counts as zero."""
+        """Return the profile at points x + iy (m), negative values included."""
         return self.top + self.weight * (np.interp(at.real, *self.line.T) - at.imag)
 
     def on(self, normal: np.ndarray) -> np.ndarray:
-        """The tensor times vectors x + iy."""
+        """Return the tensor times vectors x + iy."""
         x, y = [1, 1j] @ self.tensor
         return x * normal.real + y * normal.imag
 
@@ -67,34 +71,35 @@ class Stress:
 class Rock:
     """A rock mass of a scene, cut into blocks.
 
-    blocks: their numbers in the scene; free: those that can move; told: what became of slivers
-    and at inward corners, for a person.
+    blocks: their numbers in the scene; free: numbers of the blocks that can move; messages: what
+    was done with slivers and at inward corners, one line each.
     """
 
     name: str
     blocks: range
     free: list[int]
-    told: list[str]
+    messages: list[str]
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that a simulation needs.
+    """All input of a simulation.
 
-    pairs: laws by the blocks of [[joint]] tables; edge_laws: of each (block, edge) that lies on a
-    joint of a rock, the law of its set.
+    default_law: name of the law of joints that nothing else names. pairs: laws of `[[joint]]`
+    tables, by one or two blocks. edge_laws: law of each (block, edge) that lies on a joint of a
+    rock mass.
 
-    water: stress of water in joints and on faces; in_situ: stress before an excavation; pressure:
-    of water (Pa) in the joints of laws, by their names. stages: of an excavation, `blocks` that are
-    taken away `at` a time (s), or None when the rock is at rest, and `over` what time (s) their
-    support goes; gone: blocks that are not there from the start.
+    water: pore pressure in joints and on faces; in_situ: stress before an excavation; pressure:
+    water pressure (Pa) in the joints of a law, by its name. stages: excavation stages, each with
+    its `blocks`, its `start` (s; None: once the rock is at rest) and its `release_time` (s).
+    removed: blocks that are absent from the beginning.
 
-    slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
-    blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
-    is divided by (see `Joints`).
+    slip, shear: monitored joints, as (moving block, base); point_joints: monitored joints nearest
+    to given points, as two blocks; points: history points, as (block, position in m). reduction:
+    strength reduction factor of all joints (see `Joints`).
 
-    text: of the file that it was read from, empty for a scene made or changed in memory; files:
-    what that file names.
+    text: of the file that the scene was read from, empty for a scene made or changed in memory;
+    files: contents of the files that it names.
     """
 
     title: str
@@ -112,38 +117,46 @@ class Scene:
     in_situ: Stress | None = None
     pressure: dict[str, float] = field(default_factory=dict)
     stages: tuple[Tables, ...] = ()
-    gone: tuple[int, ...] = ()
+    removed: tuple[int, ...] = ()
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
-    near: tuple[tuple[int, int], ...] = ()
-    pins: tuple[tuple[int, tuple[float, float]], ...] = ()
+    point_joints: tuple[tuple[int, int], ...] = ()
+    points: tuple[tuple[int, tuple[float, float]], ...] = ()
     reduction: float = 1.0
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
 
     @cached_property
     def skins(self) -> np.ndarray:
-        """Reach (m) of the search for contacts of each block: of a sliver less than of others."""
+        """Range (m) of contact detection of each block; that of a sliver is smaller."""
         widths = np.array([block.width for block in self.blocks])
-        skin = np.minimum(SKIN * usual_width(self.blocks), THIN * widths)
+        skin = np.minimum(
+            SKIN_PER_MEDIAN_WIDTH * median_width(self.blocks), MAX_SKIN_PER_WIDTH * widths
+        )
         return skin if self.run.skin is None else np.full(len(widths), self.run.skin)
 
     @property
     def wet(self) -> bool:
-        """Is there water, so that the stresses of joints are effective ones?"""
+        """Whether there is water, so that stresses of joints are effective stresses."""
         return self.water is not None or any(self.pressure.values())
 
     @property
     def excavated(self) -> "Scene":
-        """The scene without what its excavation takes away, but with the stress of before."""
-        gone = [i for stage in self.stages for i in stage["blocks"]]
-        return replace(self, stages=(), gone=(*self.gone, *gone)) if gone else self
+        """The scene after all excavation stages, under the same in-situ stress."""
+        blocks = [i for stage in self.stages for i in stage["blocks"]]
+        return replace(self, stages=(), removed=(*self.removed, *blocks)) if blocks else self
 
     @property
     def base(self) -> int | None:
-        """The fixed block that displacements are measured from: of a shaken scene, one that moves
-        with all fixed rock and not by a drive of its own."""
-        gone = {*self.excavated.gone}
-        fixed = [i for i, block in enumerate(self.blocks) if block.fixed and i not in gone]
-        own = {d.blocks[0] for d in self.drives if len(d.times) > 1 and len(d.blocks) < len(fixed)}
-        return min(fixed, key=lambda i: i in own, default=None)
+        """The fixed block that displacements are relative to, None without fixed blocks.
+
+        In a shaken scene it is a block that moves with all fixed rock, not by a drive of its own.
+        """
+        removed = {*self.excavated.removed}
+        fixed = [i for i, block in enumerate(self.blocks) if block.fixed and i not in removed]
+        own_drive = {
+            drive.blocks[0]
+            for drive in self.drives
+            if len(drive.times) > 1 and len(drive.blocks) < len(fixed)
+        }
+        return min(fixed, key=lambda i: i in own_drive, default=None)

@@ -21,7 +21,7 @@ from ..dynamics.simulation import Simulation
 from ..output.folder import ABLATION, clear_run
 from ..output.record import Record, write_csv
 from ..output.run import run
-from ..scene import Refused, Scene, overlay
+from ..scene import Scene, SceneError, overlay
 
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
 
@@ -50,7 +50,7 @@ def ablate(scene: Scene, until: float | None = None) -> list[dict]:
     """
     whole, record = _run("whole scene", lambda: scene, until)
     if record is None:
-        raise Refused(whole["note"])
+        raise SceneError(whole["note"])
     rows = [whole]
     for name, make in variants(scene, record):
         row, other = _run(name, make, until)
@@ -130,7 +130,7 @@ def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dic
     started = time.process_time()
     try:
         record, summary = run(Simulation(replace(make(), title=name)), None, until)
-    except Refused as trouble:
+    except SceneError as trouble:
         return row | {"note": f"refused: {trouble}"}, None
     except (ValueError, PathError) as error:
         return row | {"note": f"cannot be built: {error}"}, None

@@ -16,7 +16,7 @@ import jointlaw as jl
 from ..output.monitors import slip_distance
 from ..output.record import Record, outcomes
 from ..output.run import to_failure
-from ..scene import USUAL, Scene, springs
+from ..scene import TYPICAL_STRESS, Scene, springs
 from .strength import alone
 
 FAR = 20.0  # slip distances: where the strength of a law is its residual one
@@ -52,7 +52,7 @@ def _stresses(record: Record) -> list[float]:
     usual one where none is pressed."""
     law, press, length = (record.joints[0][key] for key in ("law", "normal_stress_Pa", "length_m"))
     forces = (np.maximum(press, 0.0) * length * (law == i) for i in range(len(record.scene.laws)))
-    return [float(np.average(press, weights=f)) if f.any() else USUAL for f in forces]
+    return [float(np.average(press, weights=f)) if f.any() else TYPICAL_STRESS for f in forces]
 
 
 def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:

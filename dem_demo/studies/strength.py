@@ -25,7 +25,7 @@ from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
 from ..output.record import named, told
 from ..output.run import to_failure
-from ..scene import Law, Scene, Tables, build, read_tables, turn, usual_size
+from ..scene import Law, Scene, Tables, build, median_size, read_tables, rotation
 
 FILE, VERSION = "trials.json", 2
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
@@ -84,7 +84,7 @@ def strength_reduction(
         one = (alone(scene, name) if scene.rocks else scene).excavated
         tell(f"{name}: looking for blocks that cannot be held")
         loose = trials.ask(f"{name}: loose", partial(_loose, one))
-        free = sum(not b.fixed and i not in one.gone for i, b in enumerate(one.blocks))
+        free = sum(not b.fixed and i not in one.removed for i, b in enumerate(one.blocks))
         tell(f"{name}: {len(loose)} of {free} blocks cannot be held: {told(loose)}")
         row: dict = {"rock": name, "loose": loose, "without": loose}
         if len(loose) == free:
@@ -120,7 +120,7 @@ def strength_reduction(
 def seated(scene: Scene) -> Scene:
     """A scene that starts from its equilibrium, with the time step that follows: it is halved where
     joints close too far for it."""
-    return replace(scene, run=replace(scene.run, step=None, fraction=None, seat=True))
+    return replace(scene, run=replace(scene.run, step=None, fraction=None, settle=True))
 
 
 def _loose(scene: Scene) -> list[dict]:
@@ -131,7 +131,7 @@ def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray)
     """Run and draw a scene that fails; returns the blocks that move first, but for those of a mask
     `apart` (n,)."""
     record, _ = to_failure(seated(scene), until)
-    size = usual_size(block for block in scene.blocks if not block.fixed)
+    size = median_size(block for block in scene.blocks if not block.fixed)
     moved = [
         np.where(apart, 0.0, np.hypot(*record.displaced(i).T)) for i in range(len(record.times))
     ]
@@ -163,10 +163,12 @@ def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene
 
     Below zero where it does not hold as drawn.
     """
-    return _march(
-        lambda tilt: replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity)), TILT,
-        trials or Trials(scene), f"{name}: critical tilt",
-    )  # fmt: skip
+
+    def tilted(angle: float) -> Scene:
+        gravity = rotation(np.radians(angle)) @ scene.gravity
+        return replace(scene, gravity=tuple(gravity))
+
+    return _march(tilted, TILT, trials or Trials(scene), f"{name}: critical tilt")
 
 
 def weakened(scene: Scene, factor: float) -> Scene:
@@ -265,4 +267,4 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
     digs = [dig for dig in data.get("excavate", [])
             if outline.intersection(Polygon(dig["corners"])).area > 0]  # fmt: skip
     kept = {"joint": [*filter(belongs, data.get("joint", []))], "excavate": digs}
-    return build({**data, **kept, "rock": [own], "watch": {}}, files=scene.files)
+    return build({**data, **kept, "rock": [own], "monitor": {}}, files=scene.files)

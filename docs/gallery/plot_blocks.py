@@ -32,16 +32,16 @@ fixed = true
 name = "block"
 box = [1.0, 0.5]
 at = [0.0, 0.25]
-held = ["turn"]
+fixed_motions = ["turn"]
 
 [[drive]]
 block = "block"
 motion = "x"
 times = [0.0, 1.0, 3.0]
 values = [0.0, 2e-3, -2e-3]
-ease = 0.3
+ramp = 0.3
 
-[watch]
+[monitor]
 shear = [["block", "bed"]]
 
 [run]

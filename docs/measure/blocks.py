@@ -53,7 +53,7 @@ set = [
 fixed = [{{ corners = [[-40, -5], [13, -5], [13, 0.2], [0.3, 0.31], [-34, 20.12], [-40, 20]] }}]
 [run]
 end = 1.0
-seat = false
+settle = false
 step = 1e-4
 """
 
@@ -61,7 +61,7 @@ HEAP_SPACING = 0.6  # m between the centres of blocks at the start
 HEAP_SCENE = """title = "Heap of {n} blocks"
 {law}[run]
 end = {end}
-seat = false
+settle = false
 law_steps = 2
 record = 0.1
 corner_length = 0.05

@@ -17,7 +17,7 @@ from matplotlib.collections import LineCollection
 from scene_text import PLAIN, ROCK, block
 from scipy.sparse.linalg import ArpackNoConvergence
 
-from dem_demo import Refused, Simulation, load, parse, run
+from dem_demo import SceneError, Simulation, load, parse, run
 from dem_demo.cli import TRIED, main
 from dem_demo.dynamics import timestep
 from dem_demo.output.pictures import Pictures
@@ -36,7 +36,7 @@ gravity = [3.0, -9.0]
 [[joint]]
 between = ["two", "one"]
 law = "plain"
-[watch]
+[monitor]
 slip = [["one", "base"]]
 shear = [["two", "one"]]
 [run]
@@ -114,8 +114,8 @@ SHAKEN = f"""
 [[drive]]
 motion = "x"
 file = "motion.csv"
-[watch]
-pins = [[-0.9, 0.4]]
+[monitor]
+points = [[-0.9, 0.4]]
 joints = [[-0.6, 0.0]]
 [run]
 end = 0.3
@@ -137,9 +137,9 @@ def test_fixed_rock_is_driven_and_a_block_on_it_told_relative_to_it(tmp_path):
         "joint 1: normal_Pa": pytest.approx(weight * 9.81, rel=1e-3),
         "base: vx_m/s": pytest.approx(a * (record.times[-1] - 0.025), rel=1e-2),
         "base: x_m": pytest.approx(a * 0.275**2 / 2, rel=1e-2),
-        "pin 1: x_m": pytest.approx(-0.9, abs=1e-5),  # 2.5 kPa on springs of 1 GPa/m
-        "pin 1: y_m": pytest.approx(0.4, abs=1e-4),
-        "pin 1: vx_m/s": pytest.approx(0.0, abs=1e-3 * last["base: vx_m/s"]),
+        "point 1: x_m": pytest.approx(-0.9, abs=1e-5),  # 2.5 kPa on springs of 1 GPa/m
+        "point 1: y_m": pytest.approx(0.4, abs=1e-4),
+        "point 1: vx_m/s": pytest.approx(0.0, abs=1e-3 * last["base: vx_m/s"]),
     }
     assert {name: last[name] for name in known} == known
     assert abs(last["joint 1: shear_Pa"]) == pytest.approx(weight * a, rel=1e-3)
@@ -195,7 +195,7 @@ at = [0.0, HEIGHT]
 velocity = [0.0, SPEED]
 [run]
 end = 0.05
-seat = false
+settle = false
 record = 0.002
 skin = 0.05
 max_overlap = 0.02
@@ -315,7 +315,7 @@ CUT = f"""
 {PLAIN}[laws.cross]
 {PLAIN.replace("0.3", "0.8")}[[rock]]
 name = "r"
-least_width = 0.1
+min_width = 0.1
 outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
 [[rock.set]]
 dip = 0.0
@@ -329,7 +329,7 @@ through = [1.0, 0.0]
 law = "cross"
 [[rock.fixed]]
 corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.4], [0.0, 0.4]]
-[watch]
+[monitor]
 slip = [["r 3", "r 1"]]
 shear = [["r 4", "r 3"]]
 [run]
@@ -400,7 +400,7 @@ def test_a_state_that_is_refused_changes_nothing():
     for step in (0.0, np.inf, np.nan):
         with pytest.raises(ValueError, match=r"step = .* s: must be a finite number > 0"):
             Simulation(sim.scene, step, sim.state())
-    with pytest.raises(Refused, match=r"must stay below 0\.98 of the limit"):
+    with pytest.raises(SceneError, match=r"must stay below 0\.98 of the limit"):
         Simulation(sim.scene, 1.01 * limit, sim.state())
     whole = advanced(Simulation(parse(TEXT)), 6)
     assert (advanced(sim, 1).blocks.motion == whole.blocks.motion).all()

@@ -33,11 +33,11 @@ fixed = true
 name = "top"
 box = [1.0, 0.5]
 at = [0.0, 0.25]
-held = ["turn"]
+fixed_motions = ["turn"]
 [[joint]]
 between = ["top", "base"]
 law = "rock"
-[watch]
+[monitor]
 slip = [["top", "base"]]
 [[drive]]
 block = "top"
@@ -62,7 +62,7 @@ seed = 7
 set = [{ dip = 5.0 }]
 """
 FLAT = f'variant = "flat"\n{ROCKS}{VARIANT}'
-TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
+TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[monitor]'
 WRONG = [
     ('name = "top"', 'name = "top"\ndensty = 3', "densty' is unknown; did you mean 'density'"),
     ("end = 0.002", "", "run.end' is missing"),
@@ -100,18 +100,30 @@ WRONG = [
         "give `corners` alone, or `box`",
     ),
     ('name = "top"', 'name = "base"', "two blocks have the same name"),
-    ('held = ["turn"]', "fixed = true", "no block can move"),
-    ('held = ["turn"]', "fixed = true\nspin = 1.0", "a fixed block has no velocity or spin"),
-    ('held = ["turn"]', 'held = ["x", "x"]', "held = .* some of x, y, turn, each once"),
-    ('held = ["turn"]', 'held = ["x"]', "a motion of a block is prescribed twice"),
+    ('fixed_motions = ["turn"]', "fixed = true", "no block can move"),
+    (
+        'fixed_motions = ["turn"]',
+        "fixed = true\nspin = 1.0",
+        "a fixed block has no velocity or spin",
+    ),
+    (
+        'fixed_motions = ["turn"]',
+        'fixed_motions = ["x", "x"]',
+        "fixed_motions = .* some of x, y, turn, each once",
+    ),
+    (
+        'fixed_motions = ["turn"]',
+        'fixed_motions = ["x"]',
+        "a motion of a block is prescribed twice",
+    ),
     ('slip = [["top", "base"]]', 'slip = [["top", "top"]]', "slip = .* must be 2 of base, top"),
     (
         'slip = [["top", "base"]]',
-        "pins = [[9.0, 0.0]]",
-        "pins = .*inside a block that can move",
+        "points = [[9.0, 0.0]]",
+        "points = .*inside a block that can move",
     ),
     ('between = ["top", "base"]', 'between = [["top"], "base"]', "between = .* must be 2 of"),
-    ("[watch]", TWICE, r"joint\[1\]: another \[\[joint\]\] gives these blocks another law"),
+    ("[monitor]", TWICE, r"joint\[1\]: another \[\[joint\]\] gives these blocks another law"),
     (
         'block = "top"',
         'block = "bse"',
@@ -138,15 +150,23 @@ WRONG_ROCKS = [
     ("[4.0, 1.0], [1.5, 1.0]", "[-9.0, 9.0], [1.5, 1.0]", "outline: .* do not cross"),
     ('name = "slope"', 'name = "slope"\nlike = "hill"', "like = 'hill': no rock further up"),
     ('name = "slope"', 'name = "slope"\nlaws = { rough = "joint" }', "no set .* law 'rough'"),
-    ("pins = [[-2.0, 7.5]", "pins = [[-2.0, 17.5]", r"pins = \[-2.0, 17.5\]: must lie inside"),
-    ("[watch]", "[[joint]]\naround = [50.0, 0.0]\nlaw = 'joint'\n[watch]", "around = .*inside"),
+    (
+        "points = [[-2.0, 7.5]",
+        "points = [[-2.0, 17.5]",
+        r"points = \[-2.0, 17.5\]: must lie inside",
+    ),
+    ("[monitor]", "[[joint]]\naround = [50.0, 0.0]\nlaw = 'joint'\n[monitor]", "around = .*inside"),
     (
         'persistence = 0.7\nlaw = "joint"',
         'persistence = 0.7\nlaw = "j"',
         "law = 'j' is unknown",
     ),
-    ('name = "slope"', 'name = "slope"\nleast_width = 1e3', "would be slivers: give a least_width"),
-    ("[watch]", "[watch]\njoints = [[9.0, -9.0]]", r"joints = \[9.0, -9.0\]: must lie at a joint"),
+    ('name = "slope"', 'name = "slope"\nmin_width = 1e3', "would be slivers: give a min_width"),
+    (
+        "[monitor]",
+        "[monitor]\njoints = [[9.0, -9.0]]",
+        r"joints = \[9.0, -9.0\]: must lie at a joint",
+    ),
 ]
 
 
@@ -225,10 +245,10 @@ def driven(folder, record, keys=""):
 
 def test_a_motion_by_lines_is_rounded_over_its_ease():
     """1 mm in 0.1 s, averaged over the last 0.04 s, or over 0.1 s if nothing is said."""
-    for keys, ease in (("ease = 0.04", 0.04), ("", 0.1)):
+    for keys, ramp in (("ramp = 0.04", 0.04), ("", 0.1)):
         *_, drive = parse(TEXT.replace(LINES, f"{LINES}\n{keys}")).drives
-        assert drive(0.5 * ease) == pytest.approx(1e-2 * 0.125 * ease)
-        assert drive(0.1 + ease) == pytest.approx(1e-3)
+        assert drive(0.5 * ramp) == pytest.approx(1e-2 * 0.125 * ramp)
+        assert drive(0.1 + ramp) == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize(
@@ -318,7 +338,7 @@ def test_a_rock_alone_keeps_its_joints():
 def test_a_rock_alone_keeps_what_is_taken_from_it(first):
     """Wherever the corners begin, also where they reach beyond the rock."""
     corners = np.roll([[9.0, -9.0], [13.0, -9.0], [13.0, 0.0], [9.0, 0.0]], first, axis=0)
-    dig = "[[excavate]]\nover = 0.1\ncorners = "
+    dig = "[[excavate]]\nrelease_time = 0.1\ncorners = "
     given = parse((SCENES / "tunnel.toml").read_text() + f"{dig}{corners.tolist()}\n")
     assert len(given.stages) == len(alone(given, "rock").stages) == 3
 

@@ -29,7 +29,7 @@ title = "Costs $2 or $3 \\\\math"
 [laws.plain]
 {PLAIN}{block("base", box=[4.0, 1.0], at=[0.5, -0.5], fixed=True)}
 {block("$a_b$", box=[1.0, 0.5], at=[0.0, 0.25])}
-[watch]
+[monitor]
 shear = [["$a_b$", "base"]]
 [run]
 end = 0.01

@@ -14,13 +14,13 @@ from scipy.integrate import trapezoid
 from shapely import Point, Polygon
 
 import jointlaw as jl
-from dem_demo import Refused, Simulation, load, parse, run
+from dem_demo import SceneError, Simulation, load, parse, run
 from dem_demo.cli import main
 from dem_demo.contact import ContactManager
 from dem_demo.dynamics.blocks import Blocks
 from dem_demo.output.monitors import friction_angle, law_between
 from dem_demo.output.record import Record, outcomes
-from dem_demo.scene import TEMPLATE, WHOLE
+from dem_demo.scene import INTACT_ROCK, TEMPLATE
 from dem_demo.studies.ablate import _run, ablate, variants
 from dem_demo.studies.compare import compare, of_strength
 from dem_demo.studies.strength import alone, critical_tilt
@@ -96,7 +96,7 @@ def test_dilation_is_what_holds_the_rough_slope():
     """
     own = alone(load("slope"), "rough", 2)
     facets = jl.CoulombLaw(1e8, 1e8, 0.4, plane=0.0)  # the friction of the asperities alone
-    laws = {name: own.laws[name] if name == WHOLE else facets for name in own.laws}
+    laws = {name: own.laws[name] if name == INTACT_ROCK else facets for name in own.laws}
     rough, plain = critical_tilt(own), critical_tilt(replace(own, laws=laws))
     sim = Simulation(own)
     stress, force = sim.joints.traction[:, 0], sim.joints.traction[:, 0] * sim.contacts.length
@@ -117,7 +117,7 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
         ("seed = 1", "seed = 4"),
         ("persistence = 0.7", "persistence = 0.5"),
         ("end = 1.0", "end = 0.1"),
-        ("[watch]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n" + PLAIN + "\n[watch]"),
+        ("[monitor]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n" + PLAIN + "\n[monitor]"),
     ):
         assert old in text
         text = text.replace(old, new, 1)
@@ -132,7 +132,9 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     assert json.loads((out / "summary.json").read_text())["largest_energy_error"] < 1e-4
     with (out / "history.csv").open() as stream:
         *_, last = csv.DictReader(stream)
-    assert 1e-5 < float(last["pin 1: moved_m"]) < 1e-2  # the settlement of the pin's block, m
+    assert (
+        1e-5 < float(last["point 1: moved_m"]) < 1e-2
+    )  # the settlement of the block of the point, m
     words = ["resume", str(out / "state"), "--until", "0.12", "--no-pictures"]
     assert main([*words, "--out", str(tmp_path / "on")]) == 0
 
@@ -152,7 +154,7 @@ def test_joints_have_the_law_of_their_set():
     """Edges of one set face each other with its law; edges of two sets with the scene's."""
     text = TEXT.replace('law = "joint"\n\n[[rock.fixed', 'law = "plain"\n\n[[rock.fixed') + PLAIN
     scene = parse(
-        text.replace("[watch]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n[watch]")
+        text.replace("[monitor]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n[monitor]")
     )
     block = [Polygon(one.corners).contains(Point(-3.0, 7.0)) for one in scene.blocks].index(True)
     manager = ContactManager(scene, Blocks(scene).motion)
@@ -215,7 +217,7 @@ NOTCHED = """
 [[rock]]
 name = "beam"
 outline = [[0, 0], [1, 0], [1, 2], [4, 2], [4, 3], [0, 3]]
-least_width = 0.1
+min_width = 0.1
 CUT[[rock.set]]
 dip = 90.0
 spacing = 50.0
@@ -228,10 +230,13 @@ end = 0.1
 
 
 def test_a_cut_through_an_inward_corner_holds():
-    """A cantilever 3 m long on the side of a pillar: whole rock bears it, a joint does not."""
+    """A cantilever 3 m long on the side of a pillar: intact rock bears it, a joint does not."""
     for cut, state in (("", "stands"), ('cut_law = "joint"\n', "moves")):
         scene = parse(f"[laws.joint]\n{coulomb(0.1, 1e9, 1e9)}" + NOTCHED.replace("CUT", cut))
-        assert any("1 cuts that are no joints" in line for line in scene.rocks[0].told)
+        assert any(
+            "1 cuts at inward corners that are no joints" in line
+            for line in scene.rocks[0].messages
+        )
         _, summary = run(Simulation(scene))
         assert summary["rocks"][0]["state"] == state
 
@@ -243,7 +248,7 @@ SLOPE = (
     + """\
 record = 0.01
 fraction = 0.4
-[watch]
+[monitor]
 slip = [["block", "base"]]
 shear = [["block", "base"]]
 """
@@ -312,5 +317,5 @@ def test_what_cannot_be_built_or_run_is_a_row_with_its_reason_but_for_the_scene_
     row, _ = _run("a rock has columns of its own", lambda: rock, 1e-3)
     assert (row["beam, state"], row["beam, moved_m"]) == ("stands", pytest.approx(0.0, abs=1e-9))
     # a block that starts deep in its base, which no time step mends
-    with pytest.raises(Refused, match="overlap by"):
+    with pytest.raises(SceneError, match="overlap by"):
         ablate(parse(SLOPE.replace("0.15]", "0.1]")))

@@ -12,7 +12,7 @@ from scene_text import PLAIN, ROCK, block, coulomb, lines, on_base
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
-from dem_demo.scene import turn
+from dem_demo.scene import rotation
 
 REPLICA = ROCK.replace("a = 3.0", "a = 4.0")
 
@@ -37,7 +37,7 @@ def test_linear_joint_conserves_to_round_off():
 
     A block that is let go on its base bounces 3 um deep.
     """
-    run = "fraction = 0.3\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nseat = false"
+    run = "fraction = 0.3\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nsettle = false"
     sim = Simulation(parse(on_base(coulomb(np.inf, 1e9, 8e8), [1.0, 0.5]) + run))
     steps(sim, 1000)
     # Joules, of 0.1 that come and go: places are known to 5e-17 m, times a weight of 13 kN.
@@ -64,7 +64,7 @@ def test_tumbling_heap():
         text += block(name, box=size, at=at, fixed=True)
     for i, corners in enumerate(SHAPES):
         text += block(f"{i}", corners=corners, spin=0.5 * i - 1)
-    run = lines(end=1.0, seat=False, step=1e-4, law_steps=8, max_overlap=0.1, corner_length=0.05)
+    run = lines(end=1.0, settle=False, step=1e-4, law_steps=8, max_overlap=0.1, corner_length=0.05)
     sim = Simulation(parse(f"{text}[run]\n{run}dashpot_normal = 0.0\ndashpot_shear = 0.0\n"))
     gone, most, twice, potential = [], 0, 0, []
     for _ in range(6000):
@@ -100,7 +100,7 @@ fixed = true
 [[block]]
 name = "block"
 corners = [[-1.0, -0.01], [-0.005, -0.01], [-0.3, 0.99], [-1.0, 0.99]]
-held = ["y", "turn"]
+fixed_motions = ["y", "turn"]
 [[block]]
 name = "free"
 box = [1.0, 1.0]
@@ -112,7 +112,7 @@ times = [0.0, 0.3, 0.6]
 values = [0.0, 0.02, 0.0]
 [run]
 end = 0.75
-seat = false
+settle = false
 step = 1e-4
 corner_length = 0.1
 dashpot_normal = 0.0
@@ -148,10 +148,10 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
     The law's friction work is first order in its own step: it takes many of them in the landing.
     """
     # clockwise about the lower right corner, which is at the origin
-    at = turn(np.radians(-20.0)) @ [-0.5, 0.5]
+    at = rotation(np.radians(-20.0)) @ [-0.5, 0.5]
     way = {"angle": -20.0, "velocity": [spin * at[1], -spin * at[0]], "spin": -spin}
     text = on_base(law, [1.0, 1.0], at=at.tolist(), base=(10.0, 1.0), end=10.0, **way)
-    text += "seat = false\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nstep = 1e-4\n"
+    text += "settle = false\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nstep = 1e-4\n"
     sim = Simulation(parse(f"{text}law_steps = {steps}"))
     had, (held,) = collections.Counter(), sim.joints.by_law
     take = held.take
@@ -188,7 +188,7 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
 SCENE = parse(
     on_base(
         REPLICA + "plane = 0.0\nresolution = { u = 4, phi = 10, depth = 1 }\n",
-        [2.0, 1.0], at=[-1.0, 0.5], held=["turn"], end=0.5,
+        [2.0, 1.0], at=[-1.0, 0.5], fixed_motions=["turn"], end=0.5,
     )
     + """\
 step = 2e-4

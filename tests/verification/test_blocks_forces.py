@@ -15,7 +15,7 @@ from running import until
 from scene_text import ROCK, block, coulomb, lines, on_base
 
 import jointlaw
-from dem_demo import Refused, Simulation, load, parse
+from dem_demo import SceneError, Simulation, load, parse
 from dem_demo.compiled import Pool, World
 from dem_demo.contact import tabulate_first_loading
 from dem_demo.dynamics import simulation
@@ -35,7 +35,7 @@ def test_critical_damping_is_that_of_the_block_on_all_its_joints():
 
 # a block that falls on its corner, at tilts at which its lower edge is raised in part
 ROCKING = on_base(coulomb(0.5, 1e9, 8e8), [1.0, 0.5], at=[0.0, 0.279], angle=3.5)
-ROCKING += "seat = false\nstep = 1e-4\n"
+ROCKING += "settle = false\nstep = 1e-4\n"
 # a block that flies up from its seat: dashpots never pull
 FLYING = on_base(PLAIN, [1.0, 0.5], velocity=[0.0, 0.05]) + "step = 1e-4\ndashpot_normal = 0.3\n"
 GEOMETRY = ("at", "normal", "closure", "length", "pull", "twist", "opening", "sliding", "rise",
@@ -119,7 +119,7 @@ def ring(scene, share, steps):
     )
     sim.blocks.velocity[:] = sim.blocks.motion[3:] * sim.blocks.mobile.T
     size = []
-    with contextlib.suppress(Refused):  # overlap or speed: it has diverged as far as it can
+    with contextlib.suppress(SceneError):  # overlap or speed: it has diverged as far as it can
         for _ in range(steps):
             sim.step()
             size.append(np.abs(sim.blocks.motion[3:]).max())
@@ -166,7 +166,8 @@ def test_stiffness_at_stress_bounds_a_sheared_joint():
 
 
 FALL = (
-    on_base(ROCK, [1.0, 0.5], at=[0.0, 0.35], angle=3.0, end=0.4) + "seat = false\nlaw_steps = 4\n"
+    on_base(ROCK, [1.0, 0.5], at=[0.0, 0.35], angle=3.0, end=0.4)
+    + "settle = false\nlaw_steps = 4\n"
 )
 
 
@@ -192,10 +193,10 @@ def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
     assert abs(chosen.energy_balance.error) < 1e-2  # a longer step
     assert chosen.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
     given = Simulation(parse(FALL), step=first)
-    with pytest.raises(Refused, match="must stay below"):
+    with pytest.raises(SceneError, match="must stay below"):
         until(given, 0.4)
 
 
 def test_a_scene_in_which_forces_move_nothing_asks_for_a_step():
-    with pytest.raises(Refused, match=r"set run.step \(s\)"):
-        Simulation(parse(FALL.replace("angle = 3.0", 'held = ["x", "y", "turn"]')))
+    with pytest.raises(SceneError, match=r"set run.step \(s\)"):
+        Simulation(parse(FALL.replace("angle = 3.0", 'fixed_motions = ["x", "y", "turn"]')))

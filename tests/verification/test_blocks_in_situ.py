@@ -18,14 +18,14 @@ from scene_text import ROCK, block, coulomb, dipping, on_base
 from dem_demo import Simulation, load
 from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
-from dem_demo.scene import parse, turn
+from dem_demo.scene import parse, rotation
 
 PLAIN = coulomb(0.8)
 LAWS = {"plain": PLAIN, "rough": ROCK}
 RUN = "[run]\nend = 1.0\n"
 DEPTH = 100.0  # m, of the origin: stresses that hardly change from end to end of a joint
 WEIGHT = 2600 * 9.81
-HELD = 'left = "held"\nright = "held"\nbottom = "held"\ntop = "held"\n'
+HELD = 'left = "fixed"\nright = "fixed"\nbottom = "fixed"\ntop = "fixed"\n'
 ROCK_CUT = """
 [[rock]]
 name = "rock"
@@ -65,7 +65,7 @@ def test_bricks_do_not_move(angle, k0):
     for row, column in np.ndindex(7, 7):
         left = column + 0.5 * (row % 2)
         box = np.array([[left, row], [left + 1, row], [left + 1, row + 1], [left, row + 1]])
-        corners, fixed = box @ turn(np.radians(angle)).T, not (0 < row < 6 and 0 < column < 6)
+        corners, fixed = box @ rotation(np.radians(angle)).T, not (0 < row < 6 and 0 < column < 6)
         text += block(f"{row} {column}", corners=corners, fixed=fixed)
     sim = Simulation(parse(text))
     assert not sim.unstable.any()
@@ -86,7 +86,7 @@ def test_rock_cut_by_two_sets_bears_the_stress_and_stays(law, k0):
 
 def test_a_given_stress_turns_with_the_joints():
     """Without weight, loaded from three sides: (sxx, syy, sxy) on each joint."""
-    sides = HELD.replace("held", "loaded").replace('bottom = "loaded"', 'bottom = "held"')
+    sides = HELD.replace("fixed", "loaded").replace('bottom = "loaded"', 'bottom = "fixed"')
     scene = cut("stress = [4e6, 2e6, 0.5e6]", sides)
     sim = Simulation(parse("gravity = [0.0, 0.0]\n" + scene.text))
     stress = np.array([[4e6, 0.5e6], [0.5e6, 2e6]])
@@ -97,7 +97,7 @@ def test_a_given_stress_turns_with_the_joints():
 @pytest.mark.parametrize("sides", ["rollers", "loaded"])
 def test_the_floor_bears_the_weight_and_the_load_above(sides):
     """On rollers and between loads no side takes part of the weight, at any K0."""
-    given = f'left = "{sides}"\nright = "{sides}"\nbottom = "held"\ntop = "loaded"'
+    given = f'left = "{sides}"\nright = "{sides}"\nbottom = "fixed"\ntop = "loaded"'
     sim = Simulation(cut(f"k0 = 1.5\nsurface = [[0, {DEPTH}]]", given))
     assert not sim.unstable.any()
     fixed = np.array([block.fixed for block in sim.scene.blocks])
@@ -128,7 +128,7 @@ def test_water_takes_its_part_of_the_stress():
 def test_a_joint_keeps_its_closure_of_before_while_it_opens():
     """Two blocks let go from 0.5 MPa: their joint opens by stress over stiffness, 0.05 mm, before
     it bears nothing, and what it stored becomes their speed, but for the dashpots."""
-    text = f"gravity = [0.0, 0.0]\n[laws.j]\n{PLAIN}[run]\nend = 0.1\nseat = false\n"
+    text = f"gravity = [0.0, 0.0]\n[laws.j]\n{PLAIN}[run]\nend = 0.1\nsettle = false\n"
     text += "[in_situ]\nstress = [0.0, 5e5, 0.0]\n"
     for i in range(2):
         text += block(f"{i}", box=[1.0, 1.0], at=[0.0, i])
@@ -145,7 +145,7 @@ def test_a_joint_keeps_its_closure_of_before_while_it_opens():
 
 BOXES = [block(f"{i}", box=[1, 1], at=[0, i - 1.0], fixed=i == 0) for i in range(4)]
 TOWER = f"[laws.j]\n{coulomb()}{''.join(BOXES)}[run]\nend = 1.0\n"
-UNDER = "[[excavate]]\ncorners = [[-1, -0.4], [1, -0.4], [0, 0.5]]\nover = {over}\n{at}\n"
+UNDER = "[[excavate]]\ncorners = [[-1, -0.4], [1, -0.4], [0, 0.5]]\nrelease_time = {over}\n{at}\n"
 
 
 def tower(over, at=""):
@@ -172,12 +172,12 @@ def test_a_block_falls_as_its_support_goes():
 
 def test_a_stage_waits_for_its_time_or_for_rest():
     """A block dropped by 1 mm first comes to rest; a time of its own is kept."""
-    text = tower(0.01, "at = 0.02").text
+    text = tower(0.01, "start = 0.02").text
     sim = Simulation(parse(text))
     until(sim, 0.03)
     assert sim.stage_start_times == pytest.approx(0.02, abs=2e-3)
-    rest = text.replace("at = 0.02", "").replace("at = [0, 2.0]", "at = [0, 2.001]")
-    sim = Simulation(parse(rest.replace("[run]", "[run]\nseat = false\n")))
+    rest = text.replace("start = 0.02", "").replace("at = [0, 2.0]", "at = [0, 2.001]")
+    sim = Simulation(parse(rest.replace("[run]", "[run]\nsettle = false\n")))
     until(sim, 0.02)
     assert np.isinf(sim.stage_start_times)
     until(sim, 1.0)
@@ -202,7 +202,7 @@ def test_rock_is_cut_along_what_is_taken_away():
     assert areas == pytest.approx([6 * 2 + (6 + 4.2) / 2 * 1.6 + 4.2 / 2 * 0.8, 18.0], rel=0.02)
     assert sum(block.section.area for block in scene.blocks) == pytest.approx(24 * 20, rel=0.01)
     left = scene.excavated
-    assert sorted(left.gone) == sorted([i for stage in scene.stages for i in stage["blocks"]])
+    assert sorted(left.removed) == sorted([i for stage in scene.stages for i in stage["blocks"]])
     assert not left.stages
 
 
@@ -228,7 +228,7 @@ GIVE = "give either k0 or stress"
         (lambda: cut("", ""), GIVE),
         (lambda: cut("stress = [1e6, 2e6]", ""), GIVE),
         (lambda: cut("k0 = 1.0\nstress = [1e6, 1e6, 0.0]", ""), GIVE),
-        (lambda: cut('left = "held"', ""), GIVE),
+        (lambda: cut('left = "fixed"', ""), GIVE),
         (
             lambda: parse(TOWER + 2 * UNDER.format(over=0.1, at="")),
             r"excavate\[1\].corners: no block is left there",

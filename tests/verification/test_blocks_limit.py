@@ -154,12 +154,12 @@ WEDGE = """
 [[block]]
 name = "left"
 corners = [[-6.0, 0.0], [-1.5, 0.0], [0.0, {height}], [-6.0, {height}]]
-held = ["y", "turn"]
+fixed_motions = ["y", "turn"]
 load = [{push}, 0.0]
 [[block]]
 name = "right"
 corners = [[1.5, 0.0], [6.0, 0.0], [6.0, {height}], [0.0, {height}]]
-held = ["y", "turn"]
+fixed_motions = ["y", "turn"]
 load = [-{push}, 0.0]
 [[block]]
 name = "wedge"

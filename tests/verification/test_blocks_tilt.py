@@ -12,7 +12,7 @@ from dem_demo import Simulation, load, parse
 from dem_demo.output.monitors import base_angle, look, watched_slips
 from dem_demo.output.record import Record
 from dem_demo.output.run import LOOKS
-from dem_demo.scene.blocks import turn
+from dem_demo.scene.blocks import rotation
 from dem_demo.scene.read import SCENES
 
 BLOCK = """
@@ -27,7 +27,7 @@ name = "base"
 box = [4.0, 1.0]
 at = {base}
 angle = {drawn}
-held = ["x", "y"]
+fixed_motions = ["x", "y"]
 [[block]]
 name = "top"
 box = [1.0, 0.5]
@@ -38,7 +38,7 @@ block = "base"
 motion = "turn"
 times = [0.0, 0.5]
 values = [0.0, {driven}]
-[watch]
+[monitor]
 slip = [["top", "base"]]
 [run]
 end = 0.7
@@ -47,8 +47,8 @@ end = 0.7
 
 def block(gravity=0.0, drawn=0.0, driven=0.0, gap=0.0, weight=9.81):
     """A block on a base: gravity turned, the base drawn at an angle, and driven on (degrees)."""
-    down = turn(np.radians(gravity)) @ [0.0, -weight]
-    out = turn(np.radians(drawn)) @ [0.0, 1.0]
+    down = rotation(np.radians(gravity)) @ [0.0, -weight]
+    out = rotation(np.radians(drawn)) @ [0.0, 1.0]
     words = {"gravity": down.tolist(), "drawn": drawn, "driven": driven}
     words |= {"base": (-0.5 * out).tolist(), "top": ((0.25 + gap) * out).tolist()}
     return parse(BLOCK.format(**words) + ("step = 1e-4\n" if gap or not weight else ""))
@@ -75,8 +75,8 @@ def test_angle_of_the_base_is_that_against_gravity(given, angle):
 def test_a_drive_goes_back_once_its_block_has_slid():
     """The base turns from 25 to 32 degrees against gravity, but for the block: from 26.6 on, that
     is from 1.6 of the drive's 7 degrees, it slides, and the base goes back."""
-    back = 'back = { block = "top", slid = 1e-3, by = -3.0, over = 0.06 }\n[watch]'
-    text = block(gravity=-25.0, driven=7.0).text.replace("[watch]", back)
+    reverse = 'reverse = { block = "top", slip = 1e-3, by = -3.0, duration = 0.06 }\n[monitor]'
+    text = block(gravity=-25.0, driven=7.0).text.replace("[monitor]", reverse)
     sim = Simulation(parse(text))
     turned = until(sim, 0.6, lambda: np.degrees(sim.blocks.motion[2, 0]))
     assert 1.6 < max(turned) < 6.5
@@ -88,11 +88,11 @@ def test_slip_at_the_peak_friction_of_the_law():
     """Tables that tilt at 0.05 degrees per second. Two law points under a slab carry 60 and 40 % of
     its load: less than 0.2 degrees."""
     sim = Simulation(load("tilt"))
-    watch = watched_slips(sim)
-    slips = list(watch.values())
+    slips_by_pair = watched_slips(sim)
+    slips = list(slips_by_pair.values())
     while any(slip["slip_angle"] is None for slip in slips) and sim.time < sim.scene.run.end:
         steps(sim, LOOKS)
-        look(watch, sim)
+        look(slips_by_pair, sim)
         if all(slip["slip_angle"] is None for slip in slips):
             assert abs(sim.energy_balance.error) < 1e-4
     # The slab that has slipped runs away, at the end by as much as the mating length in a step.

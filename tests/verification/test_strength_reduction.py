@@ -18,7 +18,7 @@ import jointlaw as jl
 from dem_demo import Simulation
 from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
-from dem_demo.scene import load, parse, turn
+from dem_demo.scene import load, parse, rotation
 from dem_demo.studies import strength
 from dem_demo.studies.strength import alone, critical_tilt, factor_of_safety, stiffened, weakened
 
@@ -216,7 +216,7 @@ def test_pressure_on_edges_is_that_of_a_sum_over_short_pieces():
         + block("stone", corners=STONE)
         + FLOOR
     )
-    scene = parse(text + RUN + "seat = false\nstep = 1e-5\n")
+    scene = parse(text + RUN + "settle = false\nstep = 1e-5\n")
     centre, total = scene.blocks[0].centroid, np.zeros(3)
     for p, q in zip(np.array(STONE), np.roll(STONE, -1, axis=0), strict=True):
         at = p + (np.arange(200000)[:, None] + 0.5) / 200000 * (q - p)
@@ -236,12 +236,12 @@ def test_a_sinking_block_gets_from_the_water_what_its_potential_loses():
     """
     text = law("j", 0.5) + "[water]\ntable = [[-9.0, -1.2], [9.0, 0.6]]\n" + FLOOR
     text += block("stone", corners=STONE, velocity=[1.0, 2.0], spin=-1.5)
-    sim = Simulation(parse(text + "[run]\nend = 1.0\nseat = false\nstep = 1e-4\nskin = 4e-3\n"))
+    sim = Simulation(parse(text + "[run]\nend = 1.0\nsettle = false\nstep = 1e-4\nskin = 4e-3\n"))
     below = Polygon([(-9, -9), (9, -9), (9, 0.6), (-9, -1.2)])
 
     def potential():
         x, y, angle = sim.blocks.motion[:3, 1]
-        wet = Polygon(sim.scene.blocks[1].local @ turn(angle).T + [x, y]).intersection(below)
+        wet = Polygon(sim.scene.blocks[1].local @ rotation(angle).T + [x, y]).intersection(below)
         at = wet.centroid
         return WATER * wet.area * (0.1 * (at.x + 9) - 1.2 - at.y) if wet.area else 0.0
 
@@ -287,12 +287,12 @@ def test_pressure_given_for_a_law_is_taken_from_the_stress_of_its_joints():
     """20 kPa under a slab of 1 m on a slope of 3 in 4: of its 25.5 kPa x 0.8 0.4 are left."""
     text = "gravity = [5.886, -7.848]\n" + law("wet", 0.9) + "pressure = 2e4\n"
     text += block("floor", corners=[(-9, -3), (9, -3), (9, 0), (-9, 0)], fixed=True)
-    text += block("slab", corners=[(-2, 0), (2, 0), (2, 1), (-2, 1)], held=["x", "turn"])
+    text += block("slab", corners=[(-2, 0), (2, 0), (2, 1), (-2, 1)], fixed_motions=["x", "turn"])
     sim = Simulation(parse(text + RUN))
     area = sim.contacts.length
     left = sim.joints.traction[:, 0] @ area / area.sum()
     assert left == pytest.approx(2600 * 7.848 - 2e4, rel=1e-6)
-    free = parse((text + RUN).replace('held = ["x", "turn"]', "").replace("2e4", "1e4"))
+    free = parse((text + RUN).replace('fixed_motions = ["x", "turn"]', "").replace("2e4", "1e4"))
     factor = 0.9 * (1 - 1e4 / (2600 * 7.848)) / tan(atan(0.75))
     assert factor_of_safety(free) == pytest.approx(factor, rel=0.01)
 

@@ -4,10 +4,12 @@ FOLDER/axes.png."""
 import runpy
 from pathlib import Path
 
-from folder import asked
+from command_line import output_folder
 
 from jointlaw.support.pyplot import style
 
-with style() as plt:
-    runpy.run_path(str(Path(__file__).parents[1] / "paper" / "plot_fig_04.py"))
-    plt.savefig(asked(__doc__) / "axes.png", dpi=100)
+if __name__ == "__main__":
+    figure_script = Path(__file__).parents[1] / "paper" / "plot_fig_04.py"
+    with style() as plt:
+        runpy.run_path(str(figure_script))
+        plt.savefig(output_folder(__doc__) / "axes.png", dpi=100)

@@ -1,17 +1,17 @@
-"""The moving picture: a joint that is sheared to and fro, with the state of its asperities.
+"""The moving picture: a joint that is sheared forward and back, with the state of its asperities.
 
     python docs/draw/moving.py FOLDER
 
-A run of the law at a kept normal stress. Each face stands for a facet and one of its depth cells:
-inclination, gap and state are theirs; all displacements are enlarged alike. Writes
-FOLDER/moving.gif.
+A run of the law at a constant normal stress. Each drawn face represents a facet and one of its
+cells, with their inclination, gap and state; all displacements are enlarged by the same factor.
+Writes FOLDER/moving.gif.
 """
 
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from folder import asked
+from command_line import output_folder
 from PIL import Image
 
 import jointlaw as jl
@@ -21,18 +21,24 @@ from jointlaw.kernels.mating import planes
 from jointlaw.kernels.reference import parts
 from jointlaw.support.pyplot import style
 
-STRESS = 10e6
+NORMAL_STRESS = 10e6  # Pa
 LEGS = (3.5, -7.0, 7.0)  # slips, over the closure at this stress
-FRAMES = 6  # for a slip as long as that closure
+FRAMES_PER_CLOSURE = 6  # for a slip as long as that closure
+FRAME_DURATION = 80  # ms
 TEETH = 8
-ROUND = 0.1  # radius of a tip, over the width of a ramp
-BAR = 0.5e-6  # m
-STUCK, SLIDING, APART = "#1f6fd0", "#c95500", "#8a8a8a"
-LARGE = {"font.size": 15, "legend.fontsize": 14, "axes.labelsize": 15, "lines.linewidth": 2.0}
+TIP_RADIUS = 0.1  # over the width of a ramp
+MAX_ENLARGED_SLIP = 0.36  # of the largest slip, over the width of a ramp
+SCALE_BAR = 0.5e-6  # m
+STUCK_COLOUR = "#1f6fd0"
+SLIDING_COLOUR = "#c95500"
+SEPARATED_COLOUR = "#8a8a8a"
+UPPER_COLOUR = "#e6e1d7"
+LOWER_COLOUR = "#cfc8bb"
+LARGE_TEXT = {"font.size": 15, "legend.fontsize": 14, "axes.labelsize": 15, "lines.linewidth": 2.0}
 
 
 class Faces(NamedTuple):
-    """The faces of the drawn profiles, from left to right: (TEETH,) each."""
+    """The faces of the drawn profiles, in the direction of slip: (TEETH,) each."""
 
     facet: np.ndarray
     cell: np.ndarray
@@ -40,118 +46,167 @@ class Faces(NamedTuple):
     gap: np.ndarray  # m, before the joint was closed
 
 
-def choose(law):
-    """Faces for the picture: facets that look along the slip or against it, cells of all depths."""
-    k = law.tables.asperities
-    tilt = np.arctan2(k.n[1], k.n[0])
-    along = np.flatnonzero(np.abs(k.n[2]) < 0.6 * np.abs(np.sin(tilt)) + 0.05)
-    sides = [[i for i in along[np.argsort(sign * tilt[along])] if sign * tilt[i] > 0.05]
-             for sign in (1, -1)]  # fmt: skip
-    facet = np.array([sides[j % 2][(2 * (j // 2) + j // 4) % len(sides[j % 2])]
-                      for j in range(TEETH)])  # fmt: skip
-    gaps, j = k.c1[facet, None] * k.depth[facet, :-1], np.arange(TEETH)
-    near = np.sum(gaps < 1.5 * law.closure(STRESS), axis=1)
-    cell = (3 * j + j // 2) % np.maximum(near, 1)
-    return Faces(facet, cell, tilt[facet], gaps[j, cell])
+class Run(NamedTuple):
+    """The test, a value for each frame."""
+
+    slip: np.ndarray  # m
+    closure: np.ndarray  # m
+    shear_stress: np.ndarray  # Pa
+    stored: np.ndarray  # J/m2
+    dissipated: np.ndarray  # J/m2
+    colours: list  # of the faces
 
 
-def colours(joint, faces):
-    """Colour of each face by its state."""
-    k, chosen = joint.law.tables.asperities, faces[:2]
-    now = parts(joint.law.tables, joint.snapshot().values.T)
-    found = cells(k, effective_closure(k, now.delta, now.slopes))
-    limit = strength(k, planes(k, now.delta[1:], now.slopes).gamma)
-    slides = at_limit(np.hypot(*now.q), limit, found.G, found.force)[:, :, 0][chosen]
-    touches = (found.y > k.depth[:, :-1])[chosen]
-    return np.where(touches, np.where(slides, SLIDING, STUCK), APART)
-
-
-def run(law, faces):
-    """The test by frames: columns of its record, with the slip as `shear`, and colours."""
-    joint, length, frames, states = law.joint(), float(law.closure(STRESS)), [], []
-    for leg in LEGS:
-        count = round(FRAMES * abs(leg))
-        for _ in range(count):
-            now = jl.direct_shear(joint, leg * length / count, normal=STRESS, steps=5)
-            frames.append([x[-1] for x in (now.shear, now.closure, now.shear_stress, now.stored,
-                                           now.dissipated)])  # fmt: skip
-            states.append(colours(joint, faces))
-    return np.transpose(frames), states
-
-
-def draw_blocks(axes, faces, slip, closure, start, states, zoom):
-    """Ramps with the inclinations of the facets, and over each a tip of the upper block.
-
-    start: closure (m) from which the upper block is drawn as high as the picture. Where a tip is
-    pressed against its ramp it lies behind it.
-    """
-    tilt, place = faces.tilt, np.arange(TEETH)
-    ground = np.stack([np.arange(TEETH + 1.0), np.cumsum([0.0, *np.tan(tilt)])], -1)
-    along = np.stack([np.cos(tilt), np.sin(tilt)], -1)
-    normal = np.stack([-np.sin(tilt), np.cos(tilt)], -1)
-    middle = 0.5 * (ground[1:] + ground[:-1]) + normal * (zoom * faces.gap + ROUND)[:, None]
-    middle += zoom * np.array([slip, -closure])
-    turn, top = np.linspace(np.pi, 2 * np.pi, 24), ground[:, 1].max() + 0.22
-    top -= zoom * (closure - start)
-    tips = middle[:, None] + ROUND * np.stack([np.cos(turn), np.sin(turn)], -1)
-    teeth = [
-        [(x - 0.4, top), *tip, (x + 0.4, top)] for x, tip in zip(middle[:, 0], tips, strict=True)
+def choose_faces(law):
+    """Facets that face the slip or look along it, in turn, and cells of all depths."""
+    facets = law.tables.asperities
+    tilt = np.arctan2(facets.n[1], facets.n[0])
+    is_along_slip = np.abs(facets.n[2]) < 0.6 * np.abs(np.sin(tilt)) + 0.05
+    along_slip = np.flatnonzero(is_along_slip)
+    sides = [
+        [i for i in along_slip[np.argsort(sign * tilt[along_slip])] if sign * tilt[i] > 0.05]
+        for sign in (1, -1)
     ]
-    outline = np.concatenate([[(-1, top)], *teeth, [(TEETH + 1, top)]])
-    for order, (line, edge, colour) in enumerate(
-        ((outline, 2.0, "#e6e1d7"), (ground, -1.0, "#cfc8bb"))
-    ):
-        axes.fill_between(*line.T, edge, color=colour, lw=0, zorder=order)
-        axes.plot(*line.T, color="0.45", lw=1, zorder=order)
-    floor = ground[:-1, 1] + (middle[:, 0] - place) * np.tan(tilt)
-    foot = np.minimum(ROUND, (middle[:, 1] - floor) * np.cos(tilt))  # along the normal, to the ramp
-    at = middle - foot[:, None] * normal
-    for a, b, colour in zip(at - 0.11 * along, at + 0.11 * along, states, strict=True):
-        axes.plot(*np.transpose([a, b]), color=colour, lw=7, solid_capstyle="round")
-    for x, name, colour in ((0.22, "stuck", STUCK), (0.5, "sliding", SLIDING),
-                            (0.78, "separated", APART)):  # fmt: skip
+    chosen = []
+    for tooth in range(TEETH):
+        side = sides[tooth % 2]
+        chosen.append(side[(2 * (tooth // 2) + tooth // 4) % len(side)])
+    facet = np.array(chosen)
+    gaps = facets.c1[facet, None] * facets.depth[facet, :-1]
+    touching_cells = np.sum(gaps < 1.5 * law.closure(NORMAL_STRESS), axis=1)
+    teeth = np.arange(TEETH)
+    cell = (3 * teeth + teeth // 2) % np.maximum(touching_cells, 1)
+    return Faces(facet, cell, tilt[facet], gaps[teeth, cell])
+
+
+def face_colours(joint, faces):
+    """Colour of each face by its state."""
+    facets = joint.law.tables.asperities
+    chosen = faces.facet, faces.cell
+    state = parts(joint.law.tables, joint.snapshot().values.T)
+    cell_states = cells(facets, effective_closure(facets, state.delta, state.slopes))
+    limit = strength(facets, planes(facets, state.delta[1:], state.slopes).gamma)
+    slides = at_limit(np.hypot(*state.q), limit, cell_states.G, cell_states.force)
+    slides = slides[:, :, 0][chosen]
+    touches = (cell_states.y > facets.depth[:, :-1])[chosen]
+    contact_colours = np.where(slides, SLIDING_COLOUR, STUCK_COLOUR)
+    return np.where(touches, contact_colours, SEPARATED_COLOUR)
+
+
+def run_test(law, faces):
+    """Shear the joint forward and back at the constant normal stress."""
+    joint = law.joint()
+    closure = float(law.closure(NORMAL_STRESS))
+    rows = []
+    colours = []
+    for leg in LEGS:
+        frames = round(FRAMES_PER_CLOSURE * abs(leg))
+        for _ in range(frames):
+            record = jl.direct_shear(joint, leg * closure / frames, NORMAL_STRESS, steps=5)
+            columns = (record.shear, record.closure, record.shear_stress, record.stored,
+                       record.dissipated)  # fmt: skip
+            rows.append([column[-1] for column in columns])
+            colours.append(face_colours(joint, faces))
+    return Run(*np.transpose(rows), colours)
+
+
+def draw_profile(axes, faces, run, i):
+    """Ramps with the inclinations of the facets, and above each a tip of the upper block.
+
+    Where a tip is pressed against its ramp it is drawn behind the ramp.
+    """
+    enlargement = MAX_ENLARGED_SLIP / run.slip.max()
+    ground = np.stack([np.arange(TEETH + 1.0), np.cumsum([0.0, *np.tan(faces.tilt)])], -1)
+    along = np.stack([np.cos(faces.tilt), np.sin(faces.tilt)], -1)
+    normal = np.stack([-np.sin(faces.tilt), np.cos(faces.tilt)], -1)
+    centres = 0.5 * (ground[1:] + ground[:-1])
+    centres += normal * (enlargement * faces.gap + TIP_RADIUS)[:, None]
+    centres += enlargement * np.array([run.slip[i], -run.closure[i]])
+    outline = upper_outline(centres, ground, enlargement * (run.closure[i] - run.closure[0]))
+    axes.fill_between(*outline.T, 2.0, color=UPPER_COLOUR, lw=0, zorder=0)
+    axes.plot(*outline.T, color="0.45", lw=1, zorder=0)
+    axes.fill_between(*ground.T, -1.0, color=LOWER_COLOUR, lw=0, zorder=1)
+    axes.plot(*ground.T, color="0.45", lw=1, zorder=1)
+    draw_states(axes, centres, ground, along, normal, run.colours[i])
+    for x, name, colour in ((0.22, "stuck", STUCK_COLOUR), (0.5, "sliding", SLIDING_COLOUR),
+                            (0.78, "separated", SEPARATED_COLOUR)):  # fmt: skip
         axes.text(x, 0.95, name, color=colour, weight="bold", ha="center", va="top",
                   transform=axes.transAxes)  # fmt: skip
-    axes.plot([0.6, 0.6 + zoom * BAR], [-0.3, -0.3], color="k", lw=3)
-    axes.text(0.7 + zoom * BAR, -0.3, f"{1e6 * BAR:g} µm", va="center")
+    bar_end = 0.6 + enlargement * SCALE_BAR
+    axes.plot([0.6, bar_end], [-0.3, -0.3], color="k", lw=3)
+    axes.text(bar_end + 0.1, -0.3, f"{1e6 * SCALE_BAR:g} µm", va="center")
     axes.set(xlim=(0.5, TEETH - 0.5), ylim=(-0.4, 1.35), xticks=[], yticks=[])
 
 
-def draw_curve(axes, i, slip, label, *lines):
-    """Lines (values, colour) up to frame i against slip (m), in axes that hold all of the test."""
+def upper_outline(centres, ground, lowering):
+    """Outline of the upper block, whose tips are half circles about the centres."""
+    angles = np.linspace(np.pi, 2 * np.pi, 24)
+    top = ground[:, 1].max() + 0.22 - lowering
+    circle = TIP_RADIUS * np.stack([np.cos(angles), np.sin(angles)], -1)
+    outline = [[(-1, top)]]
+    for centre in centres:
+        outline.append([(centre[0] - 0.4, top), *(centre + circle), (centre[0] + 0.4, top)])
+    return np.concatenate([*outline, [(TEETH + 1, top)]])
+
+
+def draw_states(axes, centres, ground, along, normal, colours):
+    """A bar in the colour of its state where each tip touches, or is nearest to, its ramp."""
+    slope = along[:, 1] / along[:, 0]
+    ramp_height = ground[:-1, 1] + (centres[:, 0] - np.arange(TEETH)) * slope
+    distance = (centres[:, 1] - ramp_height) * along[:, 0]  # along the normal, to the ramp
+    feet = centres - np.minimum(TIP_RADIUS, distance)[:, None] * normal
+    for foot, direction, colour in zip(feet, along, colours, strict=True):
+        ends = np.transpose([foot - 0.11 * direction, foot + 0.11 * direction])
+        axes.plot(*ends, color=colour, lw=7, solid_capstyle="round")
+
+
+def draw_curve(axes, i, slip, title, *lines):
+    """Lines (values, colour) up to frame i against slip (m), in axes for the whole test."""
     for values, colour in lines:
         axes.plot(1e6 * slip, values, color=colour, alpha=0.12)
         axes.plot(1e6 * slip[: i + 1], values[: i + 1], color=colour)
         axes.plot(1e6 * slip[i], values[i], "o", color=colour, ms=8)
     axes.set(xlabel="slip (µm)", xticks=[-0.5, 0, 0.5], xticklabels=["−0.5", "0", "0.5"])
-    axes.set_title(label, fontsize=15, loc="left")
+    axes.set_title(title, fontsize=15, loc="left")
     axes.grid(alpha=0.3)
 
 
-def main(folder):
-    law = replace(jl.presets.load("biegel-rough"), resolution="fine")
-    faces, start, images = choose(law), float(law.closure(STRESS)), []
-    (slip, closure, stress, stored, lost), states = run(law, faces)
+def draw_frames(law):
+    """The frames of the moving picture."""
+    faces = choose_faces(law)
+    run = run_test(law, faces)
+    dilation = run.closure[0] - run.closure
+    images = []
     with style() as plt:
-        plt.rcParams.update(LARGE)
+        plt.rcParams.update(LARGE_TEXT)
         figure, axes = plt.subplot_mosaic("AAA;BCD", figsize=(7.8, 5.4), dpi=100)
-        for i, state in enumerate(states):
-            for one in axes.values():
-                one.clear()
-            draw_blocks(axes["A"], faces, slip[i], closure[i], start, state, 0.36 / slip.max())
-            draw_curve(axes["B"], i, slip, "shear stress (MPa)", (stress / 1e6, "k"))
-            dilation = 1e9 * (closure[0] - closure)
-            draw_curve(axes["C"], i, slip, "dilation (nm)", (dilation, "k"))
-            draw_curve(axes["D"], i, slip, "energy (J/m²)", (stored, STUCK), (lost, SLIDING))
-            for y, name, colour in ((0.96, "lost", SLIDING), (0.28, "stored", STUCK)):
-                axes["D"].text(0.04, y, name, color=colour, transform=axes["D"].transAxes, va="top")
+        energies = axes["D"]
+        for i in range(len(run.slip)):
+            for panel in axes.values():
+                panel.clear()
+            draw_profile(axes["A"], faces, run, i)
+            draw_curve(axes["B"], i, run.slip, "shear stress (MPa)", (run.shear_stress / 1e6, "k"))
+            draw_curve(axes["C"], i, run.slip, "dilation (nm)", (1e9 * dilation, "k"))
+            draw_curve(energies, i, run.slip, "energy (J/m²)", (run.stored, STUCK_COLOUR),
+                       (run.dissipated, SLIDING_COLOUR))  # fmt: skip
+            for y, name, colour in ((0.96, "dissipated", SLIDING_COLOUR),
+                                    (0.28, "stored", STUCK_COLOUR)):  # fmt: skip
+                energies.text(0.04, y, name, color=colour, transform=energies.transAxes, va="top")
             figure.canvas.draw()
-            images.append(Image.fromarray(np.array(figure.canvas.buffer_rgba())[..., :3]))
+            pixels = np.array(figure.canvas.buffer_rgba())[..., :3]
+            images.append(Image.fromarray(pixels))
+    return images
+
+
+def main(folder):
+    """Draw the frames and write them as a GIF."""
+    law = replace(jl.presets.load("biegel-rough"), resolution="fine")
+    images = draw_frames(law)
     palette = images[len(images) // 2].quantize(64)
-    first, *others = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    first.save(folder / "moving.gif", save_all=True, append_images=others, duration=80, loop=0,
-               optimize=True)  # fmt: skip
+    first, *later = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    first.save(folder / "moving.gif", save_all=True, append_images=later, duration=FRAME_DURATION,
+               loop=0, optimize=True)  # fmt: skip
 
 
 if __name__ == "__main__":
-    main(asked(__doc__))
+    main(output_folder(__doc__))

@@ -1,47 +1,60 @@
-"""Picture: slip of the scene `shaken-slope` with plain Coulomb and with the joint law, and of
-Newmark's sliding block (1965): `python docs/draw/shaken_slope.py FOLDER`."""
+"""Slip of the scene `shaken-slope` with plain Coulomb and with the joint law, and of Newmark's
+sliding block (1965): `python docs/draw/shaken_slope.py FOLDER` writes FOLDER/shaken-slope.png and
+prints the slips."""
 
 import numpy as np
-from folder import asked
+from command_line import output_folder
 from matplotlib.figure import Figure
 from scipy.integrate import cumulative_trapezoid
 
-from dem_demo import Simulation, load, run
+import dem_demo
 from jointlaw.support.pyplot import style, written
 
-DIP, GRAVITY = np.radians(25.0), 9.81  # rad, m/s2: of the scene
-CASES = {"shaken-slope-plain": "blocks, Coulomb 0.6", "shaken-slope": "blocks, joint law"}
-
-
-def newmark(drive, until):
-    """Times (s) and slip (m) of a rigid block with friction 0.6."""
-    t = np.arange(0.0, until, 1e-4)
-    a = drive.path(np.minimum(t, drive.times[-1]), nu=2) * (t < drive.times[-1])
-    along = GRAVITY * np.sin(DIP) - a * np.cos(DIP)
-    gained = along - 0.6 * (GRAVITY * np.cos(DIP) + a * np.sin(DIP))
-    velocity = cumulative_trapezoid(gained, t, initial=0.0)
-    velocity -= np.minimum.accumulate(velocity)
-    return t, cumulative_trapezoid(velocity, t, initial=0.0)
+DIP = np.radians(25.0)  # of the scene
+GRAVITY = 9.81  # m/s2
+FRICTION = 0.6  # of Newmark's block and of the scene with Coulomb
+SCENES = {"shaken-slope-plain": "blocks, Coulomb 0.6", "shaken-slope": "blocks, joint law"}
 
 
 @style()
-def draw(path):
+def main(folder):
+    """Run both scenes and draw their slip beside the slip of Newmark's block."""
     figure = Figure(figsize=(7, 4.5))
     axes = figure.subplots()
-    for name, label in CASES.items():
-        record, _ = run(Simulation(load(name)))
-        rock = record.scene.rocks[0].free
-        slid = [record.displaced(i)[rock].mean(axis=0) for i in range(len(record.times))]
-        along = (np.array(slid) - slid[0]) @ [np.cos(DIP), -np.sin(DIP)]
-        axes.plot(record.times, 1e3 * along, label=label)
-        print(f"{label}: {1e3 * along[-1]:.3g} mm")
+    for scene, label in SCENES.items():
+        record, _ = dem_demo.run(dem_demo.Simulation(dem_demo.load(scene)))
+        slip = mean_slip(record)
+        axes.plot(record.times, 1e3 * slip, label=label)
+        print(f"{label}: {1e3 * slip[-1]:.3g} mm")
     drive = next(drive for drive in record.scene.drives if drive.order)
-    times, slip = newmark(drive, record.times[-1])
+    times, slip = newmark_slip(drive, record.times[-1])
     print(f"Newmark: {1e3 * slip[-1]:.3g} mm")
     axes.plot(times, 1e3 * slip, "k:", label="Newmark's block, 0.6")
     axes.set(xlabel="time (s)", ylabel="slip relative to the rock below (mm)")
     figure.legend(loc="outside lower center", ncols=3)
-    written(figure, path)
+    written(figure, folder / "shaken-slope.png")
 
 
-draw(asked(__doc__) / "shaken-slope.png")
+def mean_slip(record):
+    """Mean slip (m) of the free blocks down the slope, at each record."""
+    free_blocks = record.scene.rocks[0].free
+    displacements = [
+        record.displaced(i)[free_blocks].mean(axis=0) for i in range(len(record.times))
+    ]
+    downslope = np.array([np.cos(DIP), -np.sin(DIP)])
+    return (np.array(displacements) - displacements[0]) @ downslope
+
+
+def newmark_slip(drive, until):
+    """Times (s) and slip (m) of a rigid block with a constant friction."""
+    times = np.arange(0.0, until, 1e-4)
+    acceleration = drive.path(np.minimum(times, drive.times[-1]), nu=2) * (times < drive.times[-1])
+    driving = GRAVITY * np.sin(DIP) - acceleration * np.cos(DIP)
+    normal = GRAVITY * np.cos(DIP) + acceleration * np.sin(DIP)
+    velocity = cumulative_trapezoid(driving - FRICTION * normal, times, initial=0.0)
+    velocity -= np.minimum.accumulate(velocity)  # the block sticks where this is zero
+    return times, cumulative_trapezoid(velocity, times, initial=0.0)
+
+
+if __name__ == "__main__":
+    main(output_folder(__doc__))

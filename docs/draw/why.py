@@ -2,19 +2,19 @@
 
     python docs/draw/why.py FOLDER
 
-three-laws.png: one cycle of shear. The law's joint is rough Westerly granite at a kept normal
+three-laws.png: one shear cycle. The law's joint is rough Westerly granite at a constant normal
 stress. Coulomb's line (a spring and a slider) and Barton and Bandis' curve (mobilised roughness:
-Barton, Bandis & Bakhtar 1985) are fitted to its first shearing, by least squares. Of the way back
-neither says anything: it follows Masing's rule, the first curve twice as large. Prints what a cycle
-loses. along-across.png: an anisotropic joint sheared along axis 2, then along axis 3. jrc.png: the
-law of `from_field` beside Barton's curves at three normal stresses. strength-surface.png: the
+Barton, Bandis & Bakhtar 1985) are fitted to its first loading, by least squares. Neither defines
+unloading: it follows Masing's rule, the first curve doubled. Prints the energy that a cycle
+dissipates. along-across.png: an anisotropic joint sheared along axis 2, then along axis 3. jrc.png:
+the law of `from_field` and Barton's curves at three normal stresses. strength-surface.png: the
 strength of that anisotropic joint by direction and normal stress.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from folder import asked
+from command_line import output_folder
 from scipy.integrate import trapezoid
 from scipy.optimize import least_squares
 
@@ -22,105 +22,136 @@ import jointlaw as jl
 from jointlaw.calibration.field import peak_displacement
 from jointlaw.support.pyplot import style
 
-STRESS, REACH, STEPS = 10e6, 0.6e-6, 150
-# slip over that at the peak, and mobilised over peak roughness; before the first row friction grows
-MOBILISED = ((0.3, 0.6, 1.0, 2.0, 4.0, 10.0, 25.0, 100.0),
-             (0.0, 0.75, 1.0, 0.85, 0.7, 0.5, 0.4, 0.0))  # fmt: skip
-OURS, COULOMB, BARTON = COLOURS = "#c95500", "#7a5bc4", "#2c8a5b"
-OTHER = "#1f6fd0"
-ROUGH = replace(jl.presets.load("biegel-rough"), resolution="fine")
-LEANING = replace(ROUGH, orientation=jl.Orientation(3.0, 0.0, 0.3))
-JRC, JCS, BASIC, STRESSES = 10.0, 100e6, 30.0, (1e6, 2e6, 5e6)  # and the friction of flat rock, deg
+NORMAL_STRESS = 10e6  # Pa
+MAX_SLIP = 0.6e-6  # m
+STEPS_PER_LEG = 150
+# Barton, Bandis & Bakhtar: slip over its value at the peak, and mobilised over peak roughness;
+# friction grows up to the first value
+RELATIVE_SLIP = 0.3, 0.6, 1.0, 2.0, 4.0, 10.0, 25.0, 100.0
+MOBILISED_ROUGHNESS = 0.0, 0.75, 1.0, 0.85, 0.7, 0.5, 0.4, 0.0
+
+JOINTLAW_COLOUR = "#c95500"
+COULOMB_COLOUR = "#7a5bc4"
+BARTON_COLOUR = "#2c8a5b"
+AXIS_3_COLOUR = "#1f6fd0"
+ROUGH_LAW = replace(jl.presets.load("biegel-rough"), resolution="fine")
+ANISOTROPIC_LAW = replace(ROUGH_LAW, orientation=jl.Orientation(3.0, 0.0, 0.3))
+
+JRC = 10.0
+JCS = 100e6  # Pa
+BASIC_FRICTION = 30.0  # deg
+FIELD_STRESSES = 1e6, 2e6, 5e6  # Pa
 
 
 def coulomb(slip, stiffness, strength):
-    """Shear stress (MPa) at a first slip (µm): MPa/µm and MPa."""
+    """Shear stress (MPa) at a first slip (µm), with stiffness (MPa/µm) and strength (MPa)."""
     return np.minimum(stiffness * slip, strength)
 
 
-def fitted(slip, stress):
-    """Stiffness and strength of Coulomb's line through these."""
+def fit_coulomb(slip, stress):
+    """Stiffness (MPa/µm) and strength (MPa) of Coulomb's line through slip (µm), stress (MPa)."""
     return least_squares(lambda q: coulomb(slip, *q) - stress, (40.0, 5.0)).x
 
 
-def barton_bandis(slip, stress, peak, roughness, residual):
-    """The same; stress (MPa), slip at the peak, JRC log10(JCS/stress), residual friction (deg)."""
-    at, share = MOBILISED
-    start = -residual / roughness  # no friction before slip
-    angle = residual + roughness * np.interp(slip / peak, (0.0, *at), (start, *share))
-    return stress * np.tan(np.radians(angle))
+def barton_bandis(slip, normal_stress, peak_slip, roughness, residual_friction):
+    """Shear stress at a first slip, in the unit of the normal stress.
+
+    roughness: JRC log10(JCS/stress) in degrees; residual_friction in degrees.
+    """
+    no_friction = -residual_friction / roughness  # before slip
+    mobilised = np.interp(
+        slip / peak_slip, (0.0, *RELATIVE_SLIP), (no_friction, *MOBILISED_ROUGHNESS)
+    )
+    angle = residual_friction + roughness * mobilised
+    return normal_stress * np.tan(np.radians(angle))
 
 
-def masing(backbone, slip):
-    """A cycle that begins with `backbone`: up to the largest slip, back to its opposite, and up."""
-    top, turn = slip.max(), int(np.argmax(slip))
-    back = int(np.argmin(slip))
-    first = backbone(slip[: turn + 1])
-    down = first[-1] - 2 * backbone((top - slip[turn + 1 : back + 1]) / 2)
-    up = down[-1] + 2 * backbone((slip[back + 1 :] + top) / 2)
-    return np.concatenate([first, down, up])
+def masing(first_loading, slip):
+    """Shear stress of a cycle to the largest slip, back to its opposite, and up again."""
+    largest_slip = slip.max()
+    reversal = int(np.argmax(slip))
+    second_reversal = int(np.argmin(slip))
+    loading = first_loading(slip[: reversal + 1])
+    backward = (largest_slip - slip[reversal + 1 : second_reversal + 1]) / 2
+    unloading = loading[-1] - 2 * first_loading(backward)
+    forward = (slip[second_reversal + 1 :] + largest_slip) / 2
+    reloading = unloading[-1] + 2 * first_loading(forward)
+    return np.concatenate([loading, unloading, reloading])
 
 
 def three_laws(plt):
-    """Prints what each loses, too."""
-    record = jl.direct_shear(ROUGH.joint(), [REACH, -REACH, REACH], STRESS, steps=STEPS)
-    slip, stress = record.shear * 1e6, record.shear_stress / 1e6
-    first, friction = slice(STEPS + 1), np.degrees(np.arctan(ROUGH.asperity.mu))
-    line = fitted(slip[first], stress[first])
+    """A shear cycle of the joint law and of two laws that are fitted to its first loading.
 
-    def curve(x, *q):
-        return barton_bandis(x, STRESS / 1e6, *q, friction)
+    Prints the energy that each dissipates.
+    """
+    legs = [MAX_SLIP, -MAX_SLIP, MAX_SLIP]
+    record = jl.direct_shear(ROUGH_LAW.joint(), legs, NORMAL_STRESS, steps=STEPS_PER_LEG)
+    slip = record.shear * 1e6
+    stress = record.shear_stress / 1e6
+    first = slice(STEPS_PER_LEG + 1)
+    friction = np.degrees(np.arctan(ROUGH_LAW.asperity.mu))
 
-    fits = [least_squares(lambda q: curve(slip[first], *q) - stress[first], (peak, 10.0))
-            for peak in (0.2, 0.6, 1.5)]  # fmt: skip
-    best = min(fits, key=lambda fit: fit.cost).x
-    lines = {
-        "jointlaw": stress,
-        "Coulomb, fitted to it": masing(lambda x: coulomb(x, *line), slip),
-        "Barton-Bandis, fitted to it": masing(lambda x: curve(x, *best), slip),
-    }
+    def barton_curve(x, peak_slip, roughness):
+        return barton_bandis(x, NORMAL_STRESS / 1e6, peak_slip, roughness, friction)
+
+    coulomb_fit = fit_coulomb(slip[first], stress[first])
+    barton_fits = [
+        least_squares(lambda q: barton_curve(slip[first], *q) - stress[first], (peak_slip, 10.0))
+        for peak_slip in (0.2, 0.6, 1.5)
+    ]
+    barton_fit = min(barton_fits, key=lambda fit: fit.cost).x
+    curves = (
+        ("jointlaw", stress, JOINTLAW_COLOUR),
+        ("Coulomb, fitted to it", masing(lambda x: coulomb(x, *coulomb_fit), slip), COULOMB_COLOUR),
+        ("Barton-Bandis, fitted to it", masing(lambda x: barton_curve(x, *barton_fit), slip),
+         BARTON_COLOUR),
+    )  # fmt: skip
     figure, axes = plt.subplots(figsize=(7.8, 5.4))
-    for i, ((name, values), colour) in enumerate(zip(lines.items(), COLOURS, strict=True)):
-        lost = trapezoid(values[STEPS:], slip[STEPS:])  # MPa µm = J/m2
-        print(f"{name}: {lost:.2f} J/m2 lost in a cycle")
+    for i, (name, values, colour) in enumerate(curves):
+        dissipated = trapezoid(values[STEPS_PER_LEG:], slip[STEPS_PER_LEG:])  # MPa µm = J/m2
+        print(f"{name}: {dissipated:.2f} J/m2 dissipated in a cycle")
         axes.plot(slip, values, color=colour, zorder=3 - i)
-        axes.text(0.03, 0.95 - 0.09 * i, f"{name}: {lost:.1f} J/m² lost", va="top", color=colour,
-                  weight="bold", transform=axes.transAxes)  # fmt: skip
+        axes.text(0.03, 0.95 - 0.09 * i, f"{name}: {dissipated:.1f} J/m² dissipated", va="top",
+                  color=colour, weight="bold", transform=axes.transAxes)  # fmt: skip
     axes.set(
         xlabel="slip (µm)",
         ylabel="shear stress (MPa)",
         ylim=(-7.5, 11.5),
-        title="A cycle of shear at a normal stress of 10 MPa: three laws, no test",
+        title="Computed shear cycle at a normal stress of 10 MPa",
     )
     return figure
 
 
 def along_across(plt):
-    """Both shear stresses over the path; Coulomb's slider, fitted to the first leg."""
-    joint = LEANING.joint()
-    legs = [
-        jl.direct_shear(joint, REACH, STRESS, azimuth=way, steps=STEPS) for way in (0.0, np.pi / 2)
+    """Both shear stresses along the path, and Coulomb's slider, fitted to the first leg."""
+    joint = ANISOTROPIC_LAW.joint()
+    records = [
+        jl.direct_shear(joint, MAX_SLIP, NORMAL_STRESS, azimuth=azimuth, steps=STEPS_PER_LEG)
+        for azimuth in (0.0, np.pi / 2)
     ]
-    ours = np.concatenate([np.stack([r.F2, r.F3], -1) for r in legs]) / 1e6
-    step = 1e6 * REACH / STEPS
-    path = np.concatenate([np.arange(STEPS + 1.0), STEPS + np.arange(STEPS + 1.0)]) * step
-    stiffness, strength = fitted(path[: STEPS + 1], ours[: STEPS + 1, 0])
-    theirs = np.zeros_like(ours)
-    for i in range(1, len(ours)):
-        axis, moved = int(i > STEPS + 1), path[i] - path[i - 1]
-        theirs[i] = theirs[i - 1] + stiffness * moved * np.eye(2)[axis]
-        theirs[i] *= min(1.0, strength / max(np.hypot(*theirs[i]), 1e-9))
+    stresses = np.concatenate([np.stack([r.F2, r.F3], -1) for r in records]) / 1e6
+    leg = np.arange(STEPS_PER_LEG + 1.0)
+    path = np.concatenate([leg, STEPS_PER_LEG + leg]) * 1e6 * MAX_SLIP / STEPS_PER_LEG
+    first = slice(STEPS_PER_LEG + 1)
+    stiffness, strength = fit_coulomb(path[first], stresses[first, 0])
+    coulomb_stresses = np.zeros_like(stresses)
+    for i in range(1, len(stresses)):
+        axis = int(i > STEPS_PER_LEG + 1)
+        trial = coulomb_stresses[i - 1] + stiffness * (path[i] - path[i - 1]) * np.eye(2)[axis]
+        coulomb_stresses[i] = trial * min(1.0, strength / max(np.hypot(*trial), 1e-9))
     figure, axes = plt.subplots(figsize=(7.8, 4.6))
-    for k, colour in enumerate((OURS, OTHER)):
-        axes.plot(path, ours[:, k], color=colour)
-        axes.plot(path, theirs[:, k], color=COULOMB, alpha=0.6, ls=("-", "--")[k], lw=1.8)
+    for k, colour in enumerate((JOINTLAW_COLOUR, AXIS_3_COLOUR)):
+        axes.plot(path, stresses[:, k], color=colour)
+        line_style = ("-", "--")[k]
+        axes.plot(path, coulomb_stresses[:, k], color=COULOMB_COLOUR, alpha=0.6, ls=line_style,
+                  lw=1.8)  # fmt: skip
     for x, y, text, colour in (
-        (0.58, 6.3, "along axis 2", OURS),
-        (1.2, 4.9, "along axis 3", OTHER),
-        (1.2, 0.3, "Coulomb, fitted to the first 0.6 µm", COULOMB),
+        (0.36, 6.4, "along axis 2", JOINTLAW_COLOUR),
+        (1.2, 3.35, "along axis 3", AXIS_3_COLOUR),
+        (1.2, 6.4, "Coulomb, fitted", COULOMB_COLOUR),
     ):
         axes.text(x, y, text, color=colour, ha="right", weight="bold")
-    axes.axvline(REACH * 1e6, color="0.5", ls=":")
+    axes.axvline(MAX_SLIP * 1e6, color="0.5", ls=":")
     axes.set(xlabel="slip (µm): first along axis 2, then along axis 3", ylabel="shear stress (MPa)")
     return figure
 
@@ -128,72 +159,86 @@ def along_across(plt):
 def jrc(plt):
     """Shear stress over normal stress, at three normal stresses."""
     law = jl.from_field(jrc=JRC, jcs=JCS, length=0.1, normal_stress=1e6, normal_stiffness=30e9,
-                        basic_friction=np.radians(BASIC))  # fmt: skip
-    peak = 1e3 * peak_displacement(JRC, 0.1)  # mm
+                        basic_friction=np.radians(BASIC_FRICTION))  # fmt: skip
+    peak_slip = 1e3 * peak_displacement(JRC, 0.1)  # mm
+    slip = np.linspace(0, 4, 300)
     figure, axes = plt.subplots(figsize=(7.8, 4.6))
-    for stress, shade in zip(STRESSES, (1.0, 0.65, 0.4), strict=True):
+    for stress, opacity in zip(FIELD_STRESSES, (1.0, 0.65, 0.4), strict=True):
         record = jl.direct_shear(law.joint(), 4e-3, stress, steps=300)
-        axes.plot(record.shear * 1e3, record.shear_stress / stress, color=OURS, alpha=shade)
-        x, rough = np.linspace(0, 4, 300), JRC * np.log10(JCS / stress)
-        axes.plot(x, barton_bandis(x, 1.0, peak, rough, BASIC), color=BARTON, alpha=shade, ls="--")
-        axes.text(4.05, record.shear_stress[-1] / stress, f"{stress / 1e6:g} MPa", va="center")
-    axes.text(0.97, 0.08, "Barton, JRC 10", color=BARTON, ha="right", weight="bold",
-              transform=axes.transAxes)  # fmt: skip
-    axes.text(0.97, 0.17, "from_field at 1 MPa", color=OURS, ha="right", weight="bold",
-              transform=axes.transAxes)  # fmt: skip
-    axes.set(xlabel="slip (mm)", ylabel="shear stress over normal stress", xlim=(0, 4.6), ylim=0)
+        ratio = record.shear_stress / stress
+        roughness = JRC * np.log10(JCS / stress)
+        barton_ratio = barton_bandis(slip, 1.0, peak_slip, roughness, BASIC_FRICTION)
+        axes.plot(record.shear * 1e3, ratio, color=JOINTLAW_COLOUR, alpha=opacity)
+        axes.plot(slip, barton_ratio, color=BARTON_COLOUR, alpha=opacity, ls="--")
+        axes.text(4.05, ratio[-1], f"{stress / 1e6:g} MPa", va="center")
+    for y, text, colour in (
+        (0.17, "from_field at 1 MPa", JOINTLAW_COLOUR),
+        (0.08, "Barton, JRC 10", BARTON_COLOUR),
+    ):
+        axes.text(0.97, y, text, color=colour, ha="right", weight="bold",
+                  transform=axes.transAxes)  # fmt: skip
+    axes.set(xlabel="slip (mm)", ylabel="shear stress / normal stress (-)", xlim=(0, 4.6), ylim=0)
     return figure
 
 
-def strongest(law, stress, way):
+def strength(law, normal_stress, azimuth):
     """The largest shear stress (MPa) to a slip of 2 µm in this direction."""
-    return (
-        jl.direct_shear(law.joint(), 2e-6, stress, azimuth=way, steps=80).shear_stress.max() / 1e6
-    )
+    record = jl.direct_shear(law.joint(), 2e-6, normal_stress, azimuth=azimuth, steps=80)
+    return record.shear_stress.max() / 1e6
 
 
 def strength_surface(plt):
-    """Strength of the joint, whose slopes fade over 0.6 µm, in three views."""
-    law = replace(LEANING, mating_length=0.6e-6, resolution=jl.Resolution(4, 8, 6))
-    ways, normal = np.radians(np.arange(0, 91, 15)), np.linspace(1, 20, 9) * 1e6
-    quarter = np.array([[strongest(law, s, w) for w in ways] for s in normal])
-    strength = np.hstack([quarter, quarter[:, -2::-1], quarter[:, 1:], quarter[:, -2::-1]])
-    turn, normal = np.radians(np.arange(0, 361, 15)), normal / 1e6
-    x, y = strength * np.cos(turn), strength * np.sin(turn)
+    """Strength of the anisotropic joint, with a mating length of 0.6 µm, in three views."""
+    law = replace(ANISOTROPIC_LAW, mating_length=0.6e-6, resolution=jl.Resolution(4, 8, 6))
+    normal_stresses = np.linspace(1, 20, 9)  # MPa
+    quadrant = np.array([[strength(law, 1e6 * stress, azimuth)
+                          for azimuth in np.radians(np.arange(0, 91, 15))]
+                         for stress in normal_stresses])  # fmt: skip
+    mirrored = quadrant[:, -2::-1]
+    strengths = np.hstack([quadrant, mirrored, quadrant[:, 1:], mirrored])
+    azimuths = np.radians(np.arange(0, 361, 15))
+    x = strengths * np.cos(azimuths)
+    y = strengths * np.sin(azimuths)
+    z = np.broadcast_to(normal_stresses[:, None], x.shape)
+    contours = (2, 5, 8)
     figure = plt.figure(figsize=(7.8, 7.6))
     plt.rcParams.update({"font.size": 12})
     solid = figure.add_subplot(2, 1, 1, projection="3d", computed_zorder=False)
-    solid.plot_surface(x, y, normal[:, None] + 0 * x, color=OURS, alpha=0.55, lw=0)
-    for k in (2, 5, 8):
-        solid.plot(x[k], y[k], normal[k], color="k", lw=1.5)
+    solid.plot_surface(x, y, z, color=JOINTLAW_COLOUR, alpha=0.55, lw=0)
+    for k in contours:
+        solid.plot(x[k], y[k], normal_stresses[k], color="k", lw=1.5)
     solid.set(xlabel="τ₂ (MPa)", ylabel="τ₃ (MPa)", zlabel="σ (MPa)", yticks=(-5, 0, 5))
     solid.set_box_aspect((1, 1, 0.7), zoom=0.95)
-    above, beside = figure.add_subplot(2, 2, 3), figure.add_subplot(2, 2, 4)
-    for k in (2, 5, 8):
-        above.plot(x[k], y[k], color="k", lw=1.5)
-        above.text(0, y[k].max() - 0.3, f"{normal[k]:.0f} MPa", ha="center", va="top", fontsize=10)
-    above.set(aspect="equal", xlabel="τ₂ (MPa)", ylabel="τ₃ (MPa)")
-    for k, name, colour in ((0, "along axis 2", OURS), (6, "along axis 3", OTHER)):
-        beside.plot(normal, strength[:, k], color=colour, label=name)
-    beside.set(xlabel="σ (MPa)", ylabel="strength (MPa)")
-    beside.legend(loc="upper left")
+    plan = figure.add_subplot(2, 2, 3)
+    for k in contours:
+        plan.plot(x[k], y[k], color="k", lw=1.5)
+        plan.text(0, y[k].max() - 0.3, f"{normal_stresses[k]:.0f} MPa", ha="center", va="top",
+                  fontsize=10)  # fmt: skip
+    plan.set(aspect="equal", xlabel="τ₂ (MPa)", ylabel="τ₃ (MPa)")
+    envelopes = figure.add_subplot(2, 2, 4)
+    for k, name, colour in (
+        (0, "along axis 2", JOINTLAW_COLOUR),
+        (6, "along axis 3", AXIS_3_COLOUR),
+    ):
+        envelopes.plot(normal_stresses, strengths[:, k], color=colour, label=name)
+    envelopes.set(xlabel="σ (MPa)", ylabel="strength (MPa)")
+    envelopes.legend(loc="upper left")
     return figure
 
 
 def main(folder):
+    """Draw all pictures."""
     with style() as plt:
-        plt.rcParams.update(
-            {
-                "font.size": 14,
-                "axes.titlesize": 15,
-                "lines.linewidth": 2.4,
-                "axes.grid": True,
-                "grid.alpha": 0.3,
-            }
-        )
+        plt.rcParams.update({
+            "font.size": 14,
+            "axes.titlesize": 15,
+            "lines.linewidth": 2.4,
+            "axes.grid": True,
+            "grid.alpha": 0.3,
+        })  # fmt: skip
         for draw in (three_laws, along_across, jrc, strength_surface):
             draw(plt).savefig(folder / f"{draw.__name__.replace('_', '-')}.png", dpi=100)
 
 
 if __name__ == "__main__":
-    main(asked(__doc__))
+    main(output_folder(__doc__))

@@ -36,6 +36,7 @@ extensions = [
     "claims",
     "commands",
     "docstrings",
+    "hosts",
     "pages",
 ]
 exclude_patterns = ["_build", "gallery", "paper", "_ext"]

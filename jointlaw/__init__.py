@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from . import presets
+from .hosts import HOSTS
 from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .joints.pool import JointPool
@@ -76,14 +77,11 @@ __all__ = [
 _LATER = {
     "ClosureCurve": "calibration.measured",
     "ShearCurve": "calibration.measured",
-    "export_c": "hosts.c.export",
-    "export_fem": "hosts.fem.export",
-    "export_lammps": "hosts.lammps.export",
-    "export_yade": "hosts.yade.export",
     "fit_curves": "calibration.fit",
     "from_field": "calibration.field",
     "from_surface": "surface.fit",
     "tabulate": "tables.tabulate",
+    **{host.function: f"hosts.{host.module}" for host in HOSTS.values()},
 }
 
 

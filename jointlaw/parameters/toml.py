@@ -26,6 +26,17 @@ def law_text(law: Any, kinds: Kinds, shown: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def text_or_reason(law: Any) -> tuple[str, str]:
+    """TOML text of a law and "", or "" and the reason if a parameter has a class without a name.
+
+    For files that show the parameters but do not need them.
+    """
+    try:
+        return law.to_toml(), ""
+    except ValueError as error:
+        return "", str(error)
+
+
 def _lines(values: Any, kinds: Kinds, path: str, shown: Mapping[str, Any]) -> list[str]:
     """Lines of a table, those of tables within it last."""
     names = [name for name, kind in kinds.items() if type(values) is kind]

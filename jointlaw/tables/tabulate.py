@@ -10,6 +10,7 @@ from ..joints.batch import JointBatch
 from ..joints.normal_control import NormalCondition, closing_increments
 from ..laws.joint_law import JointLaw
 from ..parameters.resolution import SLIP
+from ..parameters.toml import text_or_reason
 from ..support.checks import Array, integer, more_than
 from ..support.version import __version__
 from .joint_table import JointTable
@@ -125,7 +126,7 @@ def _metadata(
         "critical_time_step": 2 / math.sqrt(max(kn, kt)),
         "critical_time_step_is": "s for 1 kg per m2 of joint: multiply by sqrt(reduced mass/area); "
         "translation of one contact only, see docs/particles.md",
-        "law": law.to_toml(),
+        "law": "\n".join(text_or_reason(law)).strip(),
         "resolution_error_friction_angle": errors[3],
     }
 

@@ -9,7 +9,7 @@ import ctypes
 import numpy as np
 import pytest
 from c_host import FAST, CLaw, at, library, random_law, random_path
-from kinds import LAWS, PARAMETERS, make_law, off_default
+from kinds import LAWS, PARAMETERS, ExponentialHeights, make_law, off_default
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import header_text
@@ -22,6 +22,7 @@ BUILDS = {  # test_native.py tells the same of the library, which is made of the
     "C++": ("g++", [*FAST, "-std=c++17", "-march=x86-64-v3", "-DJOINTLAW_MANY"]),
 }
 DECLARED = [off_default(name)[0] for name in PARAMETERS]
+DECLARED.append(make_law(heights=ExponentialHeights(1e-6)))  # without parameters as TOML
 DECLARED.append(random_law(6))  # heights of a density that is infinite at the point of contact
 CONSTANTS = """#include "law_{0}.h"
 const jlaw_law *constants_{0}(void);

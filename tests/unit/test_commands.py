@@ -14,8 +14,8 @@ from scipy.ndimage import gaussian_filter
 
 import jointlaw as jl
 from jointlaw import hosts
-from jointlaw.cli.export import RUN_COMMANDS
 from jointlaw.cli.main import COMMANDS, main
+from jointlaw.hosts import HOSTS
 from jointlaw.hosts.c.export import identifier, require_name
 from jointlaw.support import units
 
@@ -71,7 +71,7 @@ def test_presets_are_listed_and_start_a_file(tmp_path, capsys):
 def test_every_command_has_an_example_and_there_is_a_version(capsys):
     commands = re.findall(r"^    (\w+) ", printed_on_exit("--help", capsys), re.MULTILINE)
     assert commands == [command.name for command in COMMANDS]
-    for name in [*commands, *(f"export {host}" for host in RUN_COMMANDS)]:
+    for name in [*commands, *(f"export {host}" for host in HOSTS)]:
         assert example(name, capsys)[: name.count(" ") + 1] == name.split()
     assert printed_on_exit("--version", capsys).endswith(f"{jl.__version__}\n")
 
@@ -100,13 +100,13 @@ def test_options_of_closure(tmp_path):
     assert (tmp_path / "o" / "closure.svg").read_text().startswith("<?xml")
 
 
-@pytest.mark.parametrize("host", RUN_COMMANDS)
+@pytest.mark.parametrize("host", HOSTS)
 def test_export_writes_the_files_of_a_host_and_prints_the_next_command(host, tmp_path, capsys):
     assert run(f"export {host} linear-a3 --resolution fast --out o") == 0
-    assert capsys.readouterr().out.endswith(f"\nrun: cd o && {RUN_COMMANDS[host]}\n")
+    assert capsys.readouterr().out.endswith(f"\nrun: cd o && {HOSTS[host].run_command}\n")
     sources = {path.name for path in (resources.files(hosts) / host).rglob("*") if path.is_file()}
     written = {path.name for path in (tmp_path / "o").iterdir()}
-    words = [word.removeprefix("./") for word in RUN_COMMANDS[host].split()]
+    words = [word.removeprefix("./") for word in HOSTS[host].run_command.split()]
     assert {word for word in words if word in sources} <= written
     assert written & sources
     assert any("linear_a3" in name for name in written) or "law.toml" in written

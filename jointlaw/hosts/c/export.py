@@ -7,6 +7,7 @@ from pathlib import Path
 from ...kernels.pack import pack, rings
 from ...laws.law import Law
 from ...native.layout import MAX_AZIMUTHS, TABLE_FORMAT, jointlaw_h
+from ...parameters.toml import text_or_reason
 from ...support.checks import Array
 from ...support.files import write_files
 
@@ -83,7 +84,7 @@ def table_text(law: Law) -> str:
     """
     numbers, arrays = packed(law)
     lines = [f"jointlaw tables {TABLE_FORMAT}", f"fingerprint {law.fingerprint}"]
-    lines += [f"# {line}" for line in law.to_toml().splitlines()]
+    lines += [f"# {line}" for line in _parameters_as_comment(law)]
     lines += [f"{key} {x if isinstance(x, int) else _exact(x)}" for key, x in numbers.items()]
     for key, array in arrays.items():
         lines.append(key)
@@ -95,10 +96,10 @@ def table_text(law: Law) -> str:
 def header_text(law: Law, name: str) -> str:
     """The tables as constants of C: `&NAME` is the law."""
     numbers, arrays = packed(law)
-    about = "\n".join(" * " + line.replace("*/", "* /") for line in law.to_toml().splitlines())
+    comment = "\n".join(" * " + line.replace("*/", "* /") for line in _parameters_as_comment(law))
     guard = f"JOINTLAW_TABLES_{name.upper()}"
     parts = [
-        f"/* {name}: tables of a joint law, made by `jointlaw export c`.\n{about}\n */",
+        f"/* {name}: tables of a joint law, made by `jointlaw export c`.\n{comment}\n */",
         f'#ifndef {guard}\n#define {guard}\n#include "jointlaw.h"\n'
         f"#if JLAW_TABLE_FORMAT != {TABLE_FORMAT}\n"
         f'#error "{name}.h has format {TABLE_FORMAT}, jointlaw.h another one: export both again"\n'
@@ -114,6 +115,12 @@ def header_text(law: Law, name: str) -> str:
         f'{_CONSTANT} jlaw_law {name} = {{{values},\n  {tables}, 0, "{law.fingerprint}"}};\n#endif'
     )
     return "\n".join([*parts, ""])
+
+
+def _parameters_as_comment(law: Law) -> list[str]:
+    """Lines with the parameters as TOML, or with the reason why they have no such text."""
+    text, reason = text_or_reason(law)
+    return text.splitlines() or [f"without parameters: {reason}"]
 
 
 def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:

@@ -7,14 +7,14 @@ from ...laws.law import Law
 from ...native.layout import jointlaw_h
 from ...support.checks import number
 from ...support.files import write_files
+from .. import DEFAULT_SEATING
 from ..c import export as c
 
-SEATING = 10e3  # Pa
 NORMAL = 2e6  # Pa: of the direct shear tests, or half of what the joint bears in its closure range
 
 
 def export_fem(
-    law: Law, directory: str | Path, name: str = "joint", seating: float = SEATING
+    law: Law, directory: str | Path, name: str = "joint", seating: float = DEFAULT_SEATING
 ) -> list[str]:
     """Write all that a finite-element code needs to run this joint; the folder may be copied away.
 

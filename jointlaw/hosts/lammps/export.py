@@ -4,6 +4,7 @@ from pathlib import Path
 
 from ...laws.law import Law
 from ...native.layout import jointlaw_h
+from ...parameters.toml import text_or_reason
 from ...support.files import write_files
 from ...tables.tabulate import require_3d
 from ..c import export as c
@@ -20,9 +21,9 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     replaced. name: of the tables, an identifier of C.
 
     Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
-    the script `in.tower`, `joint.in` (what it needs to know of this law), `law.toml` and
-    `README.md`. Returns the names. Raises ValueError for a law that does not fit, before anything
-    is written.
+    the script `in.tower`, `joint.in` (its variables for this law), `law.toml` (the parameters,
+    unless one is of a class of your own) and `README.md`. Returns the names. Raises ValueError for
+    a law that does not fit, before anything is written.
 
     >>> names = jl.export_lammps(law, "joint-for-lammps")
     """
@@ -32,14 +33,18 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     files: dict[str, str | bytes] = {
         f"{name}.jlaw": c.table_text(law),
         "joint.in": (
-            "# made by `jointlaw export lammps`: what in.tower needs to know of this joint\n"
+            "# made by `jointlaw export lammps`: variables of in.tower for this joint\n"
             f"variable law string {name}.jlaw\n"
             f"variable closure0 equal {float(law.closure(WEIGHT))!r}   # m, under {WEIGHT:g} Pa\n"
         ),
-        "law.toml": law.to_toml(),
         **{file: (source / file).read_bytes() for file in FILES},
         "jointlaw.h": jointlaw_h(),
     }
+    parameters, _ = text_or_reason(law)
+    if parameters:
+        files["law.toml"] = parameters
     folder = write_files(directory, files)
+    if not parameters:  # one from an earlier export is of another law
+        (folder / "law.toml").unlink(missing_ok=True)
     (folder / "build.sh").chmod(0o755)
     return list(files)

@@ -155,7 +155,8 @@ class JointTable:
         closure: (n,) in m after the step.
         spin: rotation (n,) in rad of the contact about its normal in this step.
 
-        Returns tractions (3, n) in Pa and shear stiffness (3, n) in Pa/m after the step.
+        Returns tractions (3, n) in Pa and shear stiffness (3, n) in Pa/m after the step. Raises
+        nothing: arguments are not checked.
         """
         row, w, secant = self.locate(closure)
         normal = np.where(closure > 0, secant * closure, 0.0)
@@ -182,7 +183,8 @@ class JointTable:
     def locate(self, closure: Array) -> tuple[NDArray[np.intp], Array, Array]:
         """Rows, weights of linear interpolation and secant normal stiffness (Pa/m), each (n,).
 
-        closure: (n,) in m; beyond the last row the normal stress follows the last tangent.
+        closure: (n,) in m; beyond the last row the normal stress follows the last tangent. Raises
+        nothing: arguments are not checked.
         """
         row = np.clip(np.searchsorted(self.closure, closure, "right") - 1, 0, len(self.closure) - 2)
         low = self.closure[row]
@@ -198,7 +200,7 @@ class JointTable:
     def shear_matrix(self, row: NDArray[np.intp], w: Array) -> Array:
         """Initial shear stiffness K22, K33, K23 (3, n) in Pa/m at these rows and weights w.
 
-        row, w: (n,) each, as `locate` returns them.
+        row, w: (n,) each, as `locate` returns them. Raises nothing: arguments are not checked.
         """
         mean, c, s = (interpolate_rows(part, row, w) for part in self._harmonics)
         return np.array([mean + c, mean - c, s])
@@ -214,7 +216,10 @@ class JointTable:
     # --------------------------------------------------------- error against the law
 
     def report(self, law: Any) -> TableReport:
-        """Errors of the table against its law on ten paths from the virgin state."""
+        """Errors of the table against its law on ten paths from the virgin state.
+
+        law: the law that the table was made from. Raises ValueError for a law of one plane.
+        """
         report = TableReport()
         for name, azimuth, corners in _report_paths(self.closure[-1], self.metadata["shear_limit"]):
             psi = np.radians(azimuth)
@@ -263,7 +268,10 @@ class JointTable:
 
 
 def load_table(path: str | Path) -> JointTable:
-    """Read a table that `JointTable.save` wrote. Raises ValueError for any other file."""
+    """Read a table that `JointTable.save` wrote.
+
+    path: of the file. Raises ValueError for any other file.
+    """
     try:
         _, mark, rest = Path(path).read_text("utf-8", "replace").partition(METADATA_MARK)
         if not mark:

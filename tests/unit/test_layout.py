@@ -81,7 +81,9 @@ def test_jointlaw_never_imports_the_demo():
 
 def public_names():
     """Full names of what docs/api.md shows; "MODULE.*" where it shows all of a module."""
-    shown, inside, module = set(), "", ""
+    shown = set()
+    inside = ""
+    module = ""
     for line in (ROOT / "docs/api.md").read_text(encoding="utf-8").splitlines():
         if found := re.match(r"\.\. currentmodule:: (\S+)", line):
             inside = f"{found[1]}."
@@ -102,7 +104,8 @@ def test_every_public_name_loads_and_stands_on_the_api_page():
 
 def test_the_example_host_imports_public_names_only():
     """What dem_demo takes of jointlaw stands in docs/api.md: a host of others has it too."""
-    public, demo = public_names(), [path for path in trees() if path.startswith("dem_demo/")]
+    public = public_names()
+    demo = [path for path in trees() if path.startswith("dem_demo/")]
     taken = {(path, name) for path in demo for name in names(path, types=True)}
     hidden = {
         (path, name)

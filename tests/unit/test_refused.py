@@ -16,7 +16,8 @@ from jointlaw.parameters.keys import checked
 from jointlaw.support.checks import number
 
 GOOD = kinds.make_law(bond=jl.Bond(2e9, 1e9, 1e6, 3e6, 300.0, 5000.0))
-NAN, INF = float("nan"), float("inf")
+NAN = float("nan")
+INF = float("inf")
 NO_NUMBERS = ["1", "", b"1", True, 1j, [1.0], {}, object, NAN, 10**400]
 
 
@@ -24,7 +25,8 @@ NO_NUMBERS = ["1", "", b"1", True, 1j, [1.0], {}, object, NAN, 10**400]
     "name", [name for name, (_, _, said) in kinds.PARAMETERS.items() if said.kind is float]
 )
 def test_what_is_no_finite_number(name):
-    (law, _), (_, path, said) = kinds.off_default(name), kinds.PARAMETERS[name]
+    law, _ = kinds.off_default(name)
+    (_, path, said) = kinds.PARAMETERS[name]
     for no_number in NO_NUMBERS if said.infinite else [*NO_NUMBERS, INF, -INF]:
         with pytest.raises(ValueError, match=rf"{path} = .* is not (a number|finite)"):
             kinds.with_value(law, path, no_number)
@@ -254,7 +256,8 @@ mu = 0.3
 )  # fmt: skip
 def test_a_mistake_is_told_by_file_and_key(tmp_path, old, new, message):
     """The same for a file and for its text."""
-    path, text = tmp_path / "bad.toml", FILE.replace(old, new, 1)
+    path = tmp_path / "bad.toml"
+    text = FILE.replace(old, new, 1)
     path.write_text(text, encoding="utf-8")
     for read, source, name in (
         (jl.JointLaw.from_toml, path, str(path)), (jl.JointLaw.from_text, text, "TOML text")

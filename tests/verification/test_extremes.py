@@ -63,13 +63,15 @@ def test_alone(changes, record):
 @pytest.mark.parametrize("key", list(EXTREMES)[:-1])
 def test_in_pairs(key, record):
     n, steps = (8, 32) if FULL else (6, 10)
-    held, refused = 0, 0
+    held = 0
+    refused = 0
     for seed, changes in enumerate(pairs()):
         # laws that are refused are slow to refuse
         if next(iter(changes)) == key and (FULL or not ends(changes)):
             faults = examine(changes, SCALE, seed, n, steps)
             assert faults == (None if ends(changes) else []), name(changes)
-            held, refused = held + (faults == []), refused + (faults is None)
+            held = held + (faults == [])
+            refused = refused + (faults is None)
     record("pairs", held, refused, held + refused)
 
 
@@ -91,7 +93,8 @@ SEEDS = 56, 61, *(range(20_000, 20_550) if FULL else range(10_000, 10_100 if COM
 @pytest.mark.parametrize("part", range(5))
 def test_random_laws_on_random_paths(part):
     """1e6 updates at full length, a part of them otherwise."""
-    seeds, refused = SEEDS[part::5], 0
+    seeds = SEEDS[part::5]
+    refused = 0
     for seed in seeds:
         changes, size = random_changes(np.random.default_rng(seed))
         faults = examine(changes, size, seed, n=64 if FULL else 8)
@@ -147,11 +150,15 @@ def test_just_inside_the_numbers_of_a_float_everything_holds(changes):
 def test_force_is_lipschitz(changes, record):
     """Continuous, with the law's own stiffness bound: |F(d + e) - F(d)| / |e| is not above it, for
     |e| of 1e-9 to 0.1 of |d|."""
-    law, n, steepest = build(**changes), 8, 0.0
-    joints, rng = law.joints(n), np.random.default_rng(5)
+    law = build(**changes)
+    n = 8
+    steepest = 0.0
+    joints = law.joints(n)
+    rng = np.random.default_rng(5)
     for d in path(rng, n, 24, SCALE)[0]:
         size = np.abs(d).max(axis=1, keepdims=True) * 10.0 ** rng.uniform(-9.0, -1.0, (n, 1))
-        e, before = rng.normal(size=(n, 3)) * size, joints.snapshot()
+        e = rng.normal(size=(n, 3)) * size
+        before = joints.snapshot()
         G = joints.update(d + e, tangent=False)[0]
         reach = joints.measures().reach
         joints.restore(before)
@@ -192,7 +199,8 @@ def kept_digits(changes):
 def followed(law, d, length=1.0, force=1.0):
     """F, C, stored and dissipated energy of joints along increments d (steps, n, 3), in the units
     of a law that is not scaled."""
-    joints, rows = law.joints(d.shape[1]), []
+    joints = law.joints(d.shape[1])
+    rows = []
     for step in d:
         F, C = joints.update(step * length)
         rows.append([
@@ -210,7 +218,8 @@ def test_results_scale(changes, record):
     from mate a joint is sheared by a whole closure while y moves by 1e-5 of itself. There the chord
     (G1 - G0)/(y1 - y0) keeps 11 digits, as a quotient and as the mean slope alike, and so does the
     loss of that step."""
-    length, unit = 1e6, 1e-9
+    length = 1e6
+    unit = 1e-9
     d, _ = path(np.random.default_rng(3), 8, 24, SCALE)
     d = np.where(np.abs(d) < 1e-130, 0.0, d)  # 1e-140 of any unit is nothing: that has one
     one = followed(build(**changes), d)
@@ -244,7 +253,8 @@ def test_nothing_is_left_at_zero_closure_and_apart(changes):
     closing again is the first closing, to the bit. Apart, shear meets nothing. At zero closure
     faces that lean against it are touched at once; faces that lie flat are not."""
     law = build(**changes)
-    joint, d = law.joint(), np.array([SCALE, 0.0, 0.0])
+    joint = law.joint()
+    d = np.array([SCALE, 0.0, 0.0])
     first = joint.update(d)[0].copy()
     for _ in range(3):
         F, C = joint.update(-d)

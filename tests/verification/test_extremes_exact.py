@@ -33,9 +33,12 @@ class Exact:
 
     def __init__(self, law):
         k = law.tables.asperities
-        self.m, self.n, self.depth = exact(k.m.T), exact(k.n.T), exact(k.depth)
+        self.m = exact(k.m.T)
+        self.n = exact(k.n.T)
+        self.depth = exact(k.depth)
         self.basis = exact(np.stack([k.s.T, k.t.T], axis=1))
-        self.area, self.c1 = exact(k.area), exact(k.c1)
+        self.area = exact(k.area)
+        self.c1 = exact(k.c1)
         self.eta, self.lam, self.mu = exact([law.asperity.eta, k.lam, k.mu])
         self.delta = exact(np.zeros(3))
         self.q = exact(np.zeros((*self.depth[:, 1:].shape, 2)))
@@ -48,28 +51,36 @@ class Exact:
 
     def cell(self, facet, i, y):
         """G_i and kappa_i."""
-        low, high = self.depth[facet][i], self.depth[facet][i + 1]
+        low = self.depth[facet][i]
+        high = self.depth[facet][i + 1]
         if y <= low:
             return mp.mpf(0), mp.mpf(0)
         r = min(y, high)
-        (base, base_slope), (top, top_slope) = self.force(low), self.force(r)
+        base, base_slope = self.force(low)
+        top, top_slope = self.force(r)
         kappa = top_slope - (base_slope if i else 0)
         return kappa * (y - r) + top - base - (top_slope - kappa) * (r - low), kappa
 
     def update(self, d):
         """Traction after the step d."""
-        d, F = exact(d), exact(np.zeros(3))
-        before, self.delta = self.delta, self.delta + d
+        d = exact(d)
+        F = exact(np.zeros(3))
+        before = self.delta
+        self.delta = self.delta + d
         for f, q in enumerate(self.q):
-            y0, y1 = self.m[f] @ before, self.m[f] @ self.delta
-            de, a = self.basis[f] @ d, self.area[f] / self.c1[f]
+            y0 = self.m[f] @ before
+            y1 = self.m[f] @ self.delta
+            de = self.basis[f] @ d
+            a = self.area[f] / self.c1[f]
             for i in range(len(q)):
-                (G0, k0), (G1, k1) = self.cell(f, i, y0), self.cell(f, i, y1)
+                G0, k0 = self.cell(f, i, y0)
+                G1, k1 = self.cell(f, i, y1)
                 if k1 > k0:
                     q[i] = q[i] + a * (G1 - G0) / (y1 - y0) * de
                 else:
                     q[i] = q[i] * (k1 / k0 if k0 > 0 else 0) + a * k1 * de
-                cap, size = self.mu * self.lam * self.area[f] * G1, mp.hypot(*q[i])
+                cap = self.mu * self.lam * self.area[f] * G1
+                size = mp.hypot(*q[i])
                 q[i] = q[i] * (cap / size if size > cap else 1)
             F = F + self.n[f] * self.area[f] * self.force(y1)[0]
             F = F + q.sum(axis=0) @ self.basis[f] / self.lam
@@ -81,9 +92,11 @@ def test_force_agrees_with_50_digits(changes, record):
     """1e-12 of |F| is asked. Chords of steps near 1e-5 of y lose five digits of sixteen, and their
     share of F is as small."""
     more = {key: value for key, value in changes.items() if key != "depth"}
-    law, worst = build(resolution=jl.Resolution(1, 3, changes["depth"]), **more), 0.0
+    law = build(resolution=jl.Resolution(1, 3, changes["depth"]), **more)
+    worst = 0.0
     for seed in range(6) if FULL else [6]:
-        joint, rng = law.joint(), np.random.default_rng(seed)
+        joint = law.joint()
+        rng = np.random.default_rng(seed)
         with mp.workdps(DIGITS):
             slow = Exact(law)
             for k in range(24):
@@ -94,7 +107,8 @@ def test_force_agrees_with_50_digits(changes, record):
                     d[1:] *= 30.0
                 # a grid of 2^-70 m: sums of steps are then exact, and no rounding of delta counts
                 d = np.round(d * 2.0**70) / 2.0**70
-                F, G = joint.update(d, tangent=False)[0], slow.update(d)
+                F = joint.update(d, tangent=False)[0]
+                G = slow.update(d)
                 size = max(abs(G))
                 worst = max(worst, float(max(abs(exact(F) - G)) / (size if size > 0 else 1)))
     record("exact", *(changes[key] for key in ("a", "mu", "lam", "depth")), worst)
@@ -108,7 +122,8 @@ def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
     y^(2 + alpha + eta): over thirty decades, from a table good to 1e-10 of the largest S / w^p."""
     heights = jl.GammaHeights(alpha, 1.15, 0.0, "individual")
     curve = virgin_curve(eta, heights)
-    p, q = mp.mpf(alpha) + 1, mp.mpf(eta) + 1
+    p = mp.mpf(alpha) + 1
+    q = mp.mpf(eta) + 1
     rise = mp.gamma(q + 1) / mp.gamma(p + q + 1)
     y = np.geomspace(1e-30, 1e4, 35)
     force, slope = curve.force(y)
@@ -125,7 +140,8 @@ def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
 
 
 COARSE = jl.Resolution(2, 3, 1)
-MASS, AREA = 1e3, 1.0  # kg, m2
+MASS = 1e3
+AREA = 1.0  # kg, m2
 EVERY = 5  # steps between looks at the energy: no divisor of a period
 # law, normal stress of the load (Pa), speed of impact as a share of that at rest closure
 MASSES = {
@@ -166,8 +182,11 @@ class Mass:
         The energy counts the kinetic part as the product of the speeds before and after: that is
         what leapfrog keeps, to the last digit on a linear spring.
         """
-        joints, load, seen = self.joints, self.load, []
-        v, F = self.start, joints.F
+        joints = self.joints
+        load = self.load
+        seen = []
+        v = self.start
+        F = joints.F
         for k in range(steps):
             faster = v + (load - F * AREA) * (dt / MASS)
             if k % EVERY == 0:
@@ -191,7 +210,8 @@ def test_energy_never_rises_above_the_first(case):
     Leapfrog keeps that of a linear spring to rounding; that of a Hertz contact without friction
     comes and goes by 1 %, and after a tenth of the run no farther than before.
     """
-    probe, mass = Mass(case), Mass(case)
+    probe = Mass(case)
+    mass = Mass(case)
     short = 0.1 * probe.law.critical_time_step(MASS, AREA, 10.0 * probe.rest)
     bound = 1.1 * probe.run(PROBE, short)[1]  # the closure reached, on a fine step
     energies, reach = mass.run(STEPS, 0.95 * mass.law.critical_time_step(MASS, AREA, bound))
@@ -230,8 +250,10 @@ def test_an_undamped_hertz_impact_gains_less_in_smaller_steps(record):
     )  # fmt: skip
     for share, promised in most.items():
         dt = share * 2.0 / np.sqrt(1.5 * 1.25**0.2)  # the deepest closure is 1.25^0.4
-        contact, closing = law.joints(4000), np.eye(3)[0]
-        x, v = -(np.arange(4000) + 0.5) / 4000 * dt, np.ones(4000)
+        contact = law.joints(4000)
+        closing = np.eye(3)[0]
+        x = -(np.arange(4000) + 0.5) / 4000 * dt
+        v = np.ones(4000)
         contact.update(np.outer(x, closing))
         for _ in range(int(8.0 / share) + 8):
             v = v - contact.update(np.outer(v * dt, closing), tangent=False)[0][:, 0] * dt

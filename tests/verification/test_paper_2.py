@@ -16,7 +16,7 @@ ROUNDING = 1e-12  # of sums of some hundred terms of order one
     ("name", "mean"), [("westerly-smooth", 1.15e-6 * 4.82), ("westerly-rough", 3.52e-6 * 7.14)]
 )
 def test_heights(name, mean):
-    """Eq. 11: asperities in touch are N_r = int_0^r N H dr
+    """Eq. 11: asperities in contact are N_r = int_0^r N H dr
     Holds: `law.contacts` is this integral to 1e-10
 
     Eq. 13: mean height beta (alpha + 1), variance beta^2 (alpha + 1)
@@ -25,8 +25,8 @@ def test_heights(name, mean):
     law = jl.presets.load(name)
     heights = law.heights
     for closure in (0.0, 1e-7, 5e-6):
-        share, _ = quad(heights.pdf, 0.0, heights.overlap + closure, epsrel=1e-12)
-        assert law.contacts(closure) == pytest.approx(law.asperity_density * share, rel=1e-10)
+        fraction, _ = quad(heights.pdf, 0.0, heights.overlap + closure, epsrel=1e-12)
+        assert law.contacts(closure) == pytest.approx(law.asperity_density * fraction, rel=1e-10)
     r = np.linspace(0.0, 80.0, 40001)[1:] * heights.beta
     mass = heights.pdf(r) * r[0]  # the density vanishes smoothly at both ends: 1e-8
     assert [mass @ r, heights.mean] == pytest.approx([mean, mean], rel=1e-8)
@@ -56,7 +56,8 @@ def test_contacts_by_direction():
     """Eq. 16: N_Omega = N_r xi(Omega) dOmega
     Holds: `law.contacts` of a direction is N_r times the density, which integrates to 1
     """
-    law, direction = jl.presets.load("jing-replica"), (0.3, 0.7)
+    law = jl.presets.load("jing-replica")
+    direction = (0.3, 0.7)
     xi = law.orientation.density(*direction)
     assert law.contacts(3e-4, direction) == pytest.approx(law.contacts(3e-4) * xi, rel=ROUNDING)
 
@@ -94,20 +95,20 @@ def test_shape_parameters():
     Holds: share inclined above 45° at a = 1: 0.884 (b = -1), 0.707 (b = 0), 0.354 (b = 2)
 
     Section 2.2.2: for b = 0 contacts are equally distributed in theta
-    One reading: per solid angle at a = 1 only; density at the axis over that at the edge is 1.000
-    (a = 1), 1.414 (a = 2), 1.500 (a = 3); uniform in cos aθ for every a
+    One reading: per solid angle at a = 1 only; the density at the axis over the density at the edge
+    is 1.000 (a = 1), 1.414 (a = 2), 1.500 (a = 3); uniform in cos aθ for every a
 
     Fig. 7c: c = 1/3 makes the density anisotropic in azimuth, c = 0 isotropic
     Holds: at θ = 90°, a = 1: 0.318/sr along axis 2, 0 along axis 3; the same for c = 0
     """
     for a, over_edge in ((1, 1.0), (2, math.sqrt(2)), (3, 1.5)):
-        axis, edge, beyond = jl.Orientation(a).density(math.pi / 2 / a * np.array([0, 1, 1.001]))
-        assert (axis / edge, beyond) == pytest.approx((over_edge, 0.0), rel=ROUNDING)
+        axis, edge, outside = jl.Orientation(a).density(math.pi / 2 / a * np.array([0, 1, 1.001]))
+        assert (axis / edge, outside) == pytest.approx((over_edge, 0.0), rel=ROUNDING)
     u = math.sqrt(0.5)  # by hand: u + b (u^3 - u)/2 at u = cos 45 deg
-    for b, share in ((-1, 0.884), (0, 0.707), (2, 0.354)):
-        found = directions(1.0, b, 0.0, math.pi / 4)[-1].sum()
-        assert found == pytest.approx(u + b * (u**3 - u) / 2, abs=ROUNDING)
-        assert found == pytest.approx(share, abs=5e-4)
-    for c, known in ((1 / 3, [1 / math.pi, 0.0]), (0.0, [0.5 / math.pi] * 2)):
-        found = jl.Orientation(1.0, 0.0, c).density(math.pi / 2, np.array([0.0, math.pi / 2]))
-        assert found == pytest.approx(known, abs=ROUNDING)  # (1 + 3c cos 2 phi)/(2 pi)
+    for b, fraction in ((-1, 0.884), (0, 0.707), (2, 0.354)):
+        steep_fraction = directions(1.0, b, 0.0, math.pi / 4)[-1].sum()
+        assert steep_fraction == pytest.approx(u + b * (u**3 - u) / 2, abs=ROUNDING)
+        assert steep_fraction == pytest.approx(fraction, abs=5e-4)
+    for c, expected in ((1 / 3, [1 / math.pi, 0.0]), (0.0, [0.5 / math.pi] * 2)):
+        density = jl.Orientation(1.0, 0.0, c).density(math.pi / 2, np.array([0.0, math.pi / 2]))
+        assert density == pytest.approx(expected, abs=ROUNDING)  # (1 + 3c cos 2 phi)/(2 pi)

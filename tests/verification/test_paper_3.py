@@ -19,9 +19,11 @@ from jointlaw.paper.closed_form import (
 from jointlaw.paper.secant import secant, series_limit, shear_factor
 
 ROUNDING = 1e-12  # of sums of some hundred terms of order one
-KN, KS = 1.7, 0.9
-D, R3 = KN - KS, math.sqrt(3)
-TWIST = (531 * R3 - 688) / 3080
+KN = 1.7
+KS = 0.9
+D = KN - KS
+R3 = math.sqrt(3)
+C33_TERM = (531 * R3 - 688) / 3080
 
 
 def linear(a, mu, b=0.0, c=0.0, **more):
@@ -42,13 +44,13 @@ TABLE_1 = {  # C11/N, C22/N and C33/N as printed; the c term of C33 at a = 3 sho
     ),
     3: lambda b, c: (
         (7 * KN - 2 * KS) / 5 - 3 * R3 / 10 * D + (69 * R3 - 72) * b / 1540 * D,
-        -(KN - 6 * KS) / 5 + 3 * R3 / 20 * D - (69 * R3 - 72) * b / 3080 * D + TWIST * c * D,
-        -(KN - 6 * KS) / 5 + 3 * R3 / 20 * D - (69 * R3 - 72) * b / 3080 * D + TWIST * c * D,
+        -(KN - 6 * KS) / 5 + 3 * R3 / 20 * D - (69 * R3 - 72) * b / 3080 * D + C33_TERM * c * D,
+        -(KN - 6 * KS) / 5 + 3 * R3 / 20 * D - (69 * R3 - 72) * b / 3080 * D + C33_TERM * c * D,
     ),
 }
 
 
-@pytest.mark.parametrize(("a", "twice"), [(1, 0.0), (2, 0.0), (3, 2 * TWIST)])
+@pytest.mark.parametrize(("a", "twice"), [(1, 0.0), (2, 0.0), (3, 2 * C33_TERM)])
 def test_table_1_as_printed(a, twice):
     """Table 1: C11, C22, C33 in closed form (a = 1, 2, 3, infinity)
     Misprint: all agree to rounding, but the c term of C33 at a = 3 needs a minus
@@ -97,16 +99,16 @@ def test_stiffness_ratio_of_the_interface():
     assert elastic(Shape(math.inf, 1.0, 0.1), 1.0, 0.3) == pytest.approx([1.0, 0.3, 0.3], abs=1e-15)
     assert ratio(1.0, -1.0) == pytest.approx(0.7 / 0.6, rel=1e-14)
     assert brentq(lambda a: ratio(a, -1.0) - 1, 1.0, 3.0) == pytest.approx(1.202, abs=5e-4)
-    near = elastic(Shape(1e8, -1.0, 0.4), 1.0, 0.3)  # differs by 1/a^2
-    assert near == pytest.approx([1.0, 0.3, 0.3], abs=1e-14)
+    large_a = elastic(Shape(1e8, -1.0, 0.4), 1.0, 0.3)  # differs by 1/a^2
+    assert large_a == pytest.approx([1.0, 0.3, 0.3], abs=1e-14)
 
 
 def test_stiffness_ratio_of_hertz_mindlin_contacts():
     """Eq. 27: K_s/K_n runs from 1 to 0.67, and is 0.83 for nu = 0.3
     Misprint: 1 to 2/3, and 0.8235 for nu = 0.3
     """
-    found = [1 / jl.Asperity.hertz_mindlin(1.0, nu, 1.0, 0.0).lam for nu in (0.0, 0.3, 0.5)]
-    assert found == pytest.approx([1.0, 0.82353, 2 / 3], rel=5e-6)
+    ratios = [1 / jl.Asperity.hertz_mindlin(1.0, nu, 1.0, 0.0).lam for nu in (0.0, 0.3, 0.5)]
+    assert ratios == pytest.approx([1.0, 0.82353, 2 / 3], rel=5e-6)
 
 
 def test_measured_stiffness_ratios():
@@ -144,7 +146,9 @@ def test_sliding_asperity(delta):
     """Eq. 5-10: a sliding asperity carries f_i q_i = 0, so |f_s| = mu f_n
     Holds: Eq. 10 is the force of a single asperity, with ζ against the sliding and δ_rj for δ_r
     """
-    n, mu, K = np.array([1.0, 0.0, 0.0]), 0.4, np.diag([KN, KS, KS])
+    n = np.array([1.0, 0.0, 0.0])
+    mu = 0.4
+    K = np.diag([KN, KS, KS])
     zeta = -np.array([0.0, *delta[1:]]) / math.hypot(*delta[1:])
     q = zeta + mu * n
     f = K @ (delta - (K @ q @ delta) / (K @ zeta @ q) * zeta)  # Eq. 10 as printed
@@ -165,35 +169,42 @@ def test_sliding_asperity(delta):
 )
 def test_total_force(delta, eta, contact):
     """Eq. 19-23: F_i = (C^e - C^p)_ij delta_j sums the asperity forces
-    Holds: to 3e-6 against the sum over 80 000 asperities, which is what the sum errs by
+    Holds: to 3e-6 against the sum over 80 000 asperities, which has an error of this size
     """
-    a, b, c, lam, mu = 2.0, 0.5, 0.1, 1.2, 0.6
+    a = 2.0
+    b = 0.5
+    c = 0.1
+    lam = 1.2
+    mu = 0.6
     n, weight = directions(a, b, c, order=240, azimuths=320)
     normal = np.tensordot(delta, n, 1)
-    dn, slip = np.maximum(normal, 0.0), np.reshape(delta, (3, 1, 1)) - normal * n
+    dn = np.maximum(normal, 0.0)
+    slip = np.reshape(delta, (3, 1, 1)) - normal * n
     ds = np.sqrt((slip**2).sum(0))
     limit = 1.0 if contact == "exact" else series_limit(eta)
     x = ds / np.where(dn > 0, mu * lam * dn, np.inf)
-    share = np.where(x < limit, x * shear_factor(np.minimum(x, limit), eta, contact), 1.0)
-    forces = lam * dn ** (1 + eta) * (n + mu * share * slip / ds)
-    found = secant(law(a, b, c, lam=lam, eta=eta, mu=mu), delta, contact)
-    assert pytest.approx((weight * forces).sum(axis=(1, 2)), abs=3e-6) == found.F
-    np.testing.assert_array_equal(found.F, (found.Ce - found.Cp) @ delta)
+    mobilised = np.where(x < limit, x * shear_factor(np.minimum(x, limit), eta, contact), 1.0)
+    forces = lam * dn ** (1 + eta) * (n + mu * mobilised * slip / ds)
+    result = secant(law(a, b, c, lam=lam, eta=eta, mu=mu), delta, contact)
+    assert pytest.approx((weight * forces).sum(axis=(1, 2)), abs=3e-6) == result.F
+    np.testing.assert_array_equal(result.F, (result.Ce - result.Cp) @ delta)
 
 
 @pytest.mark.parametrize(("a", "mu"), [(1.0, 0.4), (2.0, 0.2), (3.0, 0.1)])
 def test_sliding_angle(a, mu):
     """Eq. 30: in closure asperities slide beyond theta_s = arctan(mu K_n/K_s)
-    Holds: so the sliding share at b = 0 is cos aθ_s, to rounding in the total form
+    Holds: so the sliding fraction at b = 0 is cos aθ_s, to rounding in the total form
     """
     start = math.atan(mu * KN / KS)
-    share = math.cos(a * start)
+    sliding_fraction = math.cos(a * start)
     assert sliding_angle(KN, KS, mu) == pytest.approx(start, rel=1e-15)
-    assert secant(linear(a, mu), [1.0, 0.0, 0.0]).sliding == pytest.approx(share, abs=ROUNDING)
+    assert secant(linear(a, mu), [1.0, 0.0, 0.0]).sliding == pytest.approx(
+        sliding_fraction, abs=ROUNDING
+    )
     joint = linear(a, mu, resolution=jl.Resolution(400, 3, 1)).joint()
     F, C = joint.update([1.0, 0.0, 0.0])
     # a step function on 400 nodes: off by at most one weight, pi/2/400
-    assert joint.measures().sliding == pytest.approx(share, abs=math.pi / 800)
+    assert joint.measures().sliding == pytest.approx(sliding_fraction, abs=math.pi / 800)
     # the integrand has a kink at theta_s: second order in the nodes, (1/400)^2 = 6e-6
     exact = closure_stiffness(Shape(a), KN, KS, mu)
     assert (F[0], C[0, 0]) == pytest.approx((exact, exact), abs=1e-5)
@@ -206,8 +217,11 @@ def test_table_2_as_printed(mu):
     not K_s
     """
     t = sliding_angle(KN, KS, mu)
-    sin, cos, bend = math.sin(t), math.cos(t), 4 * t - math.pi - math.sin(4 * t)
-    two, four = 4 * math.cos(2 * t), math.cos(4 * t)
+    sin = math.sin(t)
+    cos = math.cos(t)
+    bend = 4 * t - math.pi - math.sin(4 * t)
+    two = 4 * math.cos(2 * t)
+    four = math.cos(4 * t)
     c11 = mu * KN * (sin**3 - 1) / 3 + KS * cos * (3 - cos**2) / 3
     c22 = mu * KN * (1 - sin**3) / 6 + KS * cos**3 / 6
     assert inelastic(Shape(1.0), KN, KS, mu) == pytest.approx([c11, c22, c22], abs=ROUNDING)
@@ -237,13 +251,17 @@ def test_frictionless_closure():
     Eq. 32: mu = 0 gives C11 = K_n/3 (a = 1), 3 K_n/4 (a = 2), whatever K_s
     Holds: to rounding, for K_s from 0.1 to 3 K_n
     """
-    for a, ks, lost, left in (
+    for a, ks, inelastic_over_ks, closure_over_kn in (
         (1, 0.1, 2 / 3, 1 / 3),
         (1, 3.0, 2 / 3, 1 / 3),
         (2, 0.7, 1 / 4, 3 / 4),
     ):
-        found = inelastic(Shape(a), 1.0, ks, 0.0)[0] / ks, closure_stiffness(Shape(a), 1.0, ks, 0.0)
-        assert found == pytest.approx((lost, left), rel=1e-14)
+        assert inelastic(Shape(a), 1.0, ks, 0.0)[0] / ks == pytest.approx(
+            inelastic_over_ks, rel=1e-14
+        )
+        assert closure_stiffness(Shape(a), 1.0, ks, 0.0) == pytest.approx(
+            closure_over_kn, rel=1e-14
+        )
 
 
 def test_sliding_vanishes_on_smooth_interfaces():

@@ -19,7 +19,8 @@ from jointlaw.laws.joint_law import JointLaw
 from jointlaw.paper.closed_form import Shape, inelastic
 from jointlaw.paper.secant import secant, series_limit, shear_factor
 
-MU, LAM = 0.4, 1.2
+MU = 0.4
+LAM = 1.2
 
 
 def test_hertz_mindlin_parameters():
@@ -39,7 +40,9 @@ def test_shear_law_of_an_asperity():
     assert x * shear_factor(x, 0.5) == pytest.approx(1 - (1 - x) ** 1.5, rel=1e-9)
     assert shear_factor([0.0, 1.0], 0.5) == pytest.approx([1.5, 1.0], abs=1e-11)
     shear = np.append(np.linspace(0.005, 1.1, 110), 1.0 - 0.7 ** np.arange(10, 40))  # 1: all slips
-    exact, cells, errors = 1.0 - np.maximum(1.0 - shear, 0.0) ** 1.5, (4, 16, 64, 256), []
+    exact = 1.0 - np.maximum(1.0 - shear, 0.0) ** 1.5
+    cells = (4, 16, 64, 256)
+    errors = []
     for n in cells:
         # asperities that face the joint's normal within 1e-9 rad
         nodes = jl.Resolution(1, 3, n)
@@ -69,14 +72,14 @@ def test_sliding_angle_of_the_power_law():
     """Section 4: theta_s = arctan(lambda mu) for the power law
     Holds: with Eq. 35; the capped series of Eq. 36 slides at arctan 0.899 λμ already
     """
-    for contact, reach in (("exact", 1.0), ("series", series_limit(0.5))):
-        share = secant(law(3.0, 0.0, 0.0, lam=LAM, mu=0.3), [1.0, 0.0, 0.0], contact).sliding
-        assert math.acos(share) / 3 == pytest.approx(math.atan(reach * 0.36), abs=1e-11)
+    for contact, limit in (("exact", 1.0), ("series", series_limit(0.5))):
+        sliding = secant(law(3.0, 0.0, 0.0, lam=LAM, mu=0.3), [1.0, 0.0, 0.0], contact).sliding
+        assert math.acos(sliding) / 3 == pytest.approx(math.atan(limit * 0.36), abs=1e-11)
 
 
 def test_limits_of_the_sliding_domain():
     """Eq. 37b: the sliding domain runs from 0 to theta_s
-    Misprint: those are the asperities that do not slide: at μ = 0 they would give C11p = 0 where
+    Misprint: asperities in this range do not slide: at μ = 0 they would give C11p = 0 where
     Eq. 31 has 2 K_s/3; the text above it and Eq. 29 (θ_s to π/2a) are right
     """
     for start, C11p in ((0.0, 2 / 3), (math.pi / 2, 0.0)):
@@ -88,7 +91,8 @@ def test_heights_scale_the_total_form_by_their_count():
     """Eq. 37: N is counted up to r = r0 + delta_1 (printed: delta_i)
     Misprint: only the closure changes the overlap; Eq. 21 to 23 are scaled by P(r0 + δ₁)
     """
-    plain, counted = law(), law(formation="population")
+    plain = law()
+    counted = law(formation="population")
     ratio = secant(counted, [0.4, 0.3, 0.1]).F / secant(plain, [0.4, 0.3, 0.1]).F
     np.testing.assert_allclose(ratio, counted.heights.cdf(2.4), rtol=1e-13)
     assert not secant(counted, [-2.5, 3.0, 0.0]).F.any()  # r0 + delta_1 < 0: no contact
@@ -106,11 +110,11 @@ def test_quadrature_error_is_as_claimed(monkeypatch):
     coarse = [secant(*case) for case in cases]
     monkeypatch.setattr("jointlaw.paper.secant._THETA_NODES", 72)
     monkeypatch.setattr("jointlaw.paper.secant._PHI_NODES", 56)
-    for case, found in zip(cases, coarse, strict=True):
+    for case, result in zip(cases, coarse, strict=True):
         fine = secant(*case)
-        error = np.abs([found.Ce - fine.Ce, found.Cp - fine.Cp]).max()
+        error = np.abs([result.Ce - fine.Ce, result.Cp - fine.Cp]).max()
         assert error <= 1e-7 * np.abs(fine.Ce).max()
-        assert -1e-12 < found.sliding < found.sliding + found.separated + 1e-9 < 1 + 1e-8
+        assert -1e-12 < result.sliding < result.sliding + result.separated + 1e-9 < 1 + 1e-8
 
 
 @pytest.mark.parametrize("eta", [0.0, 0.5])
@@ -122,7 +126,7 @@ def test_no_displacement_no_force(eta):
 
 
 @pytest.mark.parametrize(
-    ("eta", "delta", "contact", "named"),
+    ("eta", "delta", "contact", "message"),
     [
         (0.5, [1.0, 0.0], "exact", "delta"),
         (0.5, [1.0, math.nan, 0.0], "exact", "delta"),
@@ -131,8 +135,8 @@ def test_no_displacement_no_force(eta):
         (1.5, [1.0, 0.0, 0.0], "series", r"asperity\.eta"),
     ],
 )
-def test_bad_input_is_refused(eta, delta, contact, named):
-    with pytest.raises(ValueError, match=named):
+def test_invalid_input_raises(eta, delta, contact, message):
+    with pytest.raises(ValueError, match=message):
         secant(law(eta=eta), delta, contact)
 
 
@@ -155,19 +159,25 @@ def test_closure():
     def crossing(pair, stress):
         return brentq(lambda u: stress(pair[0], u) / stress(pair[1], u) - 1, 2e-8, 2e-6, xtol=1e-12)
 
-    alone = [replace(law, heights=replace(law.heights, formation="individual")) for law in GRANITE]
+    individual = [
+        replace(law, heights=replace(law.heights, formation="individual")) for law in GRANITE
+    ]
     total = crossing(GRANITE, lambda law, u: secant(law, [u, 0.0, 0.0]).F[0])
-    found = total, *(crossing(pair, JointLaw.normal_stress) for pair in (GRANITE, alone))
-    # virgin curves are exact but for the 12 inclinations
-    assert found == pytest.approx([0.156e-6, 0.159e-6, 0.383e-6], rel=5e-3)
-    closed = [law.closure(50e6) for law in GRANITE]
-    assert closed == pytest.approx([0.426e-6, 0.508e-6], rel=2e-3)
-    at = np.array([0.1e-6, 0.4e-6])
-    slopes = [law.normal_stress(at * 1.0001) - law.normal_stress(at * 0.9999) for law in GRANITE]
+    crossings = [total, *(crossing(pair, JointLaw.normal_stress) for pair in (GRANITE, individual))]
+    # first-loading curves are exact except for the 12 inclinations
+    assert crossings == pytest.approx([0.156e-6, 0.159e-6, 0.383e-6], rel=5e-3)
+    closures = [law.closure(50e6) for law in GRANITE]
+    assert closures == pytest.approx([0.426e-6, 0.508e-6], rel=2e-3)
+    closure = np.array([0.1e-6, 0.4e-6])
+    slopes = [
+        law.normal_stress(closure * 1.0001) - law.normal_stress(closure * 0.9999) for law in GRANITE
+    ]
     growth = [high / low / 4 for low, high in slopes]  # steps in proportion to closure
     assert growth == pytest.approx([3.80, 2.37], rel=2e-3)
-    other = [replace(ROUGH, heights=SMOOTH.heights), replace(ROUGH, orientation=SMOOTH.orientation)]
-    gain = [law.normal_stress(0.4e-6) / ROUGH.normal_stress(0.4e-6) for law in other]
+    with_smooth_heights = replace(ROUGH, heights=SMOOTH.heights)
+    with_smooth_orientation = replace(ROUGH, orientation=SMOOTH.orientation)
+    variants = (with_smooth_heights, with_smooth_orientation)
+    gain = [law.normal_stress(0.4e-6) / ROUGH.normal_stress(0.4e-6) for law in variants]
     assert gain == pytest.approx([1.228, 1.059], abs=2e-3)
 
 
@@ -193,14 +203,14 @@ def test_initial_shear_stiffness():
     """
     stresses = (0.1e6, 1e6, 10e6, 50e6)
     smooth, rough = (np.array([initial_stiffness(x, s) for s in stresses]) for x in GRANITE)
-    total, ours = np.transpose(smooth / rough)
+    total, incremental = np.transpose(smooth / rough)
     assert total == pytest.approx([1.37, 1.42, 1.59, 1.85], abs=0.01)
-    assert ours == pytest.approx([0.96, 1.03, 1.26, 1.59], abs=0.01)
+    assert incremental == pytest.approx([0.96, 1.03, 1.26, 1.59], abs=0.01)
     stress = np.array([1e6, 5e6, 10e6, 20e6, 50e6])
     values = np.array([initial_stiffness(SMOOTH, s) for s in stress])
-    total, ours = 1e-6 * np.diff(values, axis=0).T / np.diff(stress)
+    total, incremental = 1e-6 * np.diff(values, axis=0).T / np.diff(stress)
     assert total == pytest.approx([4.7, 2.8, 2.0, 1.4], abs=0.1)
-    assert ours == pytest.approx([7.2, 4.7, 3.7, 2.8], abs=0.1)
+    assert incremental == pytest.approx([7.2, 4.7, 3.7, 2.8], abs=0.1)
 
 
 def test_contacts_form_early():
@@ -208,10 +218,10 @@ def test_contacts_form_early():
     Holds: of those new up to 50 MPa, by 12.5 and 25 MPa have formed 44 % and 67 % (smooth), 41 %
     and 64 % (rough)
     """
-    for one, shares in ((SMOOTH, (0.44, 0.67)), (ROUGH, (0.41, 0.64))):
-        start = one.asperity_density * one.heights.cdf(one.heights.overlap)
-        formed = one.contacts(one.closure([12.5e6, 25e6, 50e6])) - start
-        assert formed[:2] / formed[2] == pytest.approx(shares, abs=0.01)
+    for granite, fractions in ((SMOOTH, (0.44, 0.67)), (ROUGH, (0.41, 0.64))):
+        initial = granite.asperity_density * granite.heights.cdf(granite.heights.overlap)
+        formed = granite.contacts(granite.closure([12.5e6, 25e6, 50e6])) - initial
+        assert formed[:2] / formed[2] == pytest.approx(fractions, abs=0.01)
 
 
 def test_forming_of_contacts_does_not_bend_the_stiffness():
@@ -222,7 +232,7 @@ def test_forming_of_contacts_does_not_bend_the_stiffness():
     laws = (SMOOTH, replace(SMOOTH, heights=None))
     ends = [[initial_stiffness(law, s)[1] for s in (9e6, 11e6)] for law in laws]
     powers = [log(high / low) / log(11 / 9) for low, high in ends]
-    # the depth nodes, which are fixed lengths, move the exponent by a few thousandths
+    # the cells, which have fixed limits, move the exponent by a few thousandths
     assert powers == pytest.approx([0.52, 1 / 3], abs=0.01)
 
 

@@ -55,21 +55,22 @@ def path(rng, n, steps, size):
 
 def run(law, size, seed, n=8, steps=32):
     """All faults along random paths of n joints, each with its step."""
-    joints, found = law.joints(n), []
+    joints = law.joints(n)
+    found = []
     lost, peak, forces = np.zeros((3, n))
     paths = path(np.random.default_rng(seed), n, steps, size)
     for k, (d, home) in enumerate(zip(*paths, strict=True)):
         d[home] = -joints.delta[home] * [1.0, 0.0, 0.0]
         before = joints.snapshot().values
         F, C = joints.update(d)
-        gained, stored = joints.dissipated_energy - lost, joints.stored_energy
-        lost, peak = lost + gained, np.maximum(peak, stored)
+        gained = joints.dissipated_energy - lost
+        stored = joints.stored_energy
+        lost = lost + gained
+        peak = np.maximum(peak, stored)
         forces = np.maximum(forces, np.abs(F).max(axis=1))
         if law.tables.yields:  # a small difference of those that would be borne by elastic facets
-            facets, now = (
-                law.tables.asperities,
-                kernel.parts(law.tables, joints.snapshot().values.T),
-            )
+            facets = law.tables.asperities
+            now = kernel.parts(law.tables, joints.snapshot().values.T)
             force, _ = facets.curve.force(effective_closure(facets, now.delta, now.slopes))
             forces = np.maximum(forces, (1.0 + facets.mu) * (facets.area @ force))
         excess = sliders_within_friction(joints)

@@ -1,4 +1,4 @@
-"""The forward model: parameters by name to a law and to its closure curve, and a law to them."""
+"""The forward model: from parameter values to a law and its closure curve, and from a law back."""
 
 import math
 from dataclasses import dataclass, is_dataclass, replace
@@ -20,116 +20,155 @@ from ..parameters.rock import ROCK
 from ..support.checks import Array
 from .priors import PARTS, Values
 
-# Without a law to begin with. The mean inclination is 19 degrees, as of the paper's rough granite
+# Used without an initial law. The mean inclination is 19 degrees, as of the rough granite of the
+# paper
 DEFAULT = JointLaw(
     orientation=Orientation(a=3.0),
     asperity=ROCK,
     heights=GammaHeights(alpha=3.7, beta=1e-5, formation="individual"),
     asperity_density=1e6,
 )
-STEPS = 30  # that shear a joint to begin with; a fit halves them while that matters
+INITIAL_STEPS = 30  # of a shear test; a fit doubles them while the results depend on them
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What of a law is decided rather than fitted."""
+    """Properties of a law that are not fitted.
 
-    law: JointLaw = DEFAULT  # whatever is not fitted is kept
+    law: all its parameters that are not fitted are used.
+    resolution: of the law.
+    closure_range: of the law, in m; None for its default.
+    steps: steps of a whole shear test, see `ShearCurve.path`.
+    """
+
+    law: JointLaw = DEFAULT
     resolution: Any = "balanced"
-    closure_range: Any = None  # m
-    steps: int = STEPS  # that shear a joint the whole way, see `ShearCurve.path`
+    closure_range: Any = None
+    steps: int = INITIAL_STEPS
 
 
-def found_in(part: Any) -> list[str]:
-    """Names of the parameters of a law, or of a part of it, that a fit may find."""
+def fittable_parameters(part: Any) -> list[str]:
+    """Names of the parameters of a law, or of a part of it, that can be fitted."""
     declared = parameters_of(part) if is_dataclass(part) else {}
-    return [name for name, said in declared.items() if said.fit]
+    return [name for name, parameter in declared.items() if parameter.fit]
 
 
-def parameters(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
-    """Parameters of a law by name, those that a fit may find, and its settings.
+def parameters_of_law(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
+    """All parameters of a law that can be fitted, by name, and its settings.
 
-    Of a law with a bond its cohesion and tension too, of one with heights theirs. Raises ValueError
-    for a law without asperities.
+    They include cohesion and tension of a law with a bond, and the heights of a law with heights.
+    Raises ValueError for a law without asperities.
     """
     if not isinstance(law, JointLaw | None):
         raise ValueError(f"law: {type(law).__name__} cannot be fitted; give it a JointLaw")
     settings = Settings() if law is None else Settings(law, law.resolution, law.closure_range)
     parts = [getattr(settings.law, name) if name else settings.law for name in PARTS]
-    return {name: getattr(part, name) for part in parts for name in found_in(part)}, settings
+    values = {name: getattr(part, name) for part in parts for name in fittable_parameters(part)}
+    return values, settings
 
 
-def build(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
-    """The law of these parameters; `plane` restricts it to motion at that azimuth (rad).
+def build_law(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
+    """The law with these parameters.
 
-    A mating length shorter than a law can have is raised to the shortest.
+    A mating length below the minimum of a law is raised to the minimum.
+
+    Parameters
+    ----------
+    values: values of all parameters in SI units by name.
+    settings: settings of the law.
+    plane: azimuth in rad that motion is restricted to, or None.
     """
     base = settings.law
-    asked: dict[str, Any] = {"resolution": settings.resolution, "plane": plane}
-    mated = replace(
-        base, **asked, **{name: _filled(getattr(base, name), values) for name in PARTS if name},
-        asperity_density=values["asperity_density"], closure_range=settings.closure_range,
-        mating_length=math.inf, slope_wear=math.inf, slope_residual=0.0,
-    )  # fmt: skip
+    options: dict[str, Any] = {"resolution": settings.resolution, "plane": plane}
+    parts = {name: _with_values(getattr(base, name), values) for name in PARTS if name}
+    interlocked = replace(
+        base,
+        **options,
+        **parts,
+        asperity_density=values["asperity_density"],
+        closure_range=settings.closure_range,
+        mating_length=math.inf,
+        slope_wear=math.inf,
+        slope_residual=0.0,
+    )
     if math.isinf(values["mating_length"]):
-        return mated
+        return interlocked
+    min_mating_length = SHORTEST * interlocked.closure_range
     return replace(
-        mated, **asked, slope_wear=values["slope_wear"], slope_residual=values["slope_residual"],
-        mating_length=max(values["mating_length"], SHORTEST * mated.closure_range),
-    )  # fmt: skip
+        interlocked,
+        **options,
+        slope_wear=values["slope_wear"],
+        slope_residual=values["slope_residual"],
+        mating_length=max(values["mating_length"], min_mating_length),
+    )
 
 
-def _filled(part: Any, values: Values) -> Any:
-    """A part of a law with these values of all that a fit may find in it.
+def _with_values(part: Any, values: Values) -> Any:
+    """A part of a law with these values of all its parameters that can be fitted.
 
-    An energy of fracture that was given grows with the square of its strength, as the elastic
-    energy at the peak does: hence no strength is out of bounds.
+    The fracture energies of a bond change with the square of the strength, as the elastic energy at
+    the peak does, so that any strength is valid.
     """
-    changed: dict[str, Any] = {name: values[name] for name in found_in(part)}
+    changes: dict[str, Any] = {name: values[name] for name in fittable_parameters(part)}
     for _, strength, energy in MODES if isinstance(part, Bond) else ():
-        whole, growth = getattr(part, energy), values[strength] / (getattr(part, strength) or 1.0)
-        changed[energy] = whole * growth**2 if whole else None
-    return replace(part, **changed) if changed else part
+        initial_energy = getattr(part, energy)
+        ratio = values[strength] / (getattr(part, strength) or 1.0)
+        changes[energy] = initial_energy * ratio**2 if initial_energy else None
+    return replace(part, **changes) if changes else part
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
-    """Logarithm of the normal stress (Pa) along closures (m, n) that may fall and grow again.
+    """Logarithm of the normal stress (Pa) along a sequence of closures.
 
-    As `JointLaw.normal_stress` while they grow; after that shear forces between the asperities
-    are taken to fall with the normal ones, which a joint's friction changes by a few per cent.
-    Without the table of a law: a fit asks for a hundred sets of parameters at ten closures each.
+    In first loading this is `JointLaw.normal_stress`. In unloading the shear forces between the
+    asperities are assumed to decrease in proportion to the normal forces; friction changes the
+    result by a few per cent. No table of the law is made, because a fit needs a hundred sets of
+    parameters at ten closures each.
+
+    Parameters
+    ----------
+    values: values of all parameters by name.
+    closure: closures in m, (n,), in their order; unloading and reloading are possible.
+    settings: settings of the law.
     """
-    law, r = settings.law, resolve(settings.resolution)
-    p, heights = _filled(law.asperity, values), _filled(law.heights, values)
-    nodes = facets(_filled(law.orientation, values), r.u, r.phi, closure_only=True)
+    law = settings.law
+    resolution = resolve(settings.resolution)
+    p = _with_values(law.asperity, values)
+    heights = _with_values(law.heights, values)
+    orientation = _with_values(law.orientation, values)
+    nodes = facets(orientation, resolution.u, resolution.phi, closure_only=True)
     scale = nodes.scale(p, values["asperity_density"])
-    force = _force(closure, p.eta, heights)
+    force = _first_loading_force(closure, p.eta, heights)
     stress = facet_sum(nodes.theta, scale, p.lam, p.mu) * force
-    if (yielding := yield_sum(nodes.theta, scale, p)) is not None:
-        share, depth = yielding
-        flat = _force(np.maximum.accumulate(closure)[:, None] - depth, p.eta, heights)
-        stress = stress - np.minimum(flat, force[:, None]) @ share
-    for element in law.tables.elements[1:]:  # what stands beside the asperities
+    yielding = yield_sum(nodes.theta, scale, p)
+    if yielding is not None:
+        weight, yield_closure = yielding
+        max_closure = np.maximum.accumulate(closure)[:, None]
+        plastic_force = _first_loading_force(max_closure - yield_closure, p.eta, heights)
+        stress = stress - np.minimum(plastic_force, force[:, None]) @ weight
+    for element in law.tables.elements[1:]:  # elements other than the asperities
         stress = stress + element.normal_stress(np.maximum(closure, 0.0))
     return np.log(np.maximum(stress, 1e-300))
 
 
-def _force(closure: Array, eta: float, heights: HeightDistribution | None) -> Array:
-    """The virgin curve Phi at closures (m) of any shape, a hundred times in a fit.
+def _first_loading_force(closure: Array, eta: float, heights: HeightDistribution | None) -> Array:
+    """The first-loading curve Phi at closures (m) of any shape.
 
-    Asperities of gamma heights that each feel the closure since they touched have a closed form,
-    int_0^y (y - r)^(1 + eta) dH(r), by Kummer's function; a product of positive terms.
+    For gamma heights of "individual" formation the integral int_0^y (y - r)^(1 + eta) dH(r) is a
+    product of positive terms with Kummer's function, which is faster than the general curve.
     """
-    y, power = np.maximum(closure, 1e-15), 1 + eta
+    y = np.maximum(closure, 1e-15)
+    power = 1 + eta
     if (
         not isinstance(heights, GammaHeights)
         or heights.formation != "individual"
         or heights.overlap > 0
-        or heights.alpha > 30  # beyond what Kummer's function can, as is the next
-        or y.max() > 300 * heights.beta
+        or heights.alpha > 30  # beyond the range in which Kummer's function is accurate
+        or y.max() > 300 * heights.beta  # likewise
     ):
         return exact_force(y.ravel(), eta, heights)[0].reshape(y.shape)
-    x, top = y / heights.beta, heights.alpha + 2 + power
+    x = y / heights.beta
+    top = heights.alpha + 2 + power
     ratio = special.gammaln(1 + power) - special.gammaln(top) + power * math.log(heights.beta)
     kummer: Array = special.hyp1f1(1 + power, top, x)
     return kummer * np.exp(ratio + (top - 1) * np.log(x) - x)

@@ -1,4 +1,4 @@
-"""How noisy what was measured is: expected levels, and those that the scatter about a fit shows."""
+"""Measurement noise: expected levels, and levels estimated from the residuals of a fit."""
 
 from typing import NamedTuple
 
@@ -6,50 +6,62 @@ import numpy as np
 
 from ..support.checks import Array
 
-FACTOR = 4.0  # 95 % range of a level about the expected one, either way
-_SD = np.log(FACTOR) / 1.96
-_GRID = np.linspace(-3.2, 3.2, 33)
+FACTOR = 4.0  # the 95 % range of a level is from 1/4 to 4 times the expected one
+_LOG_SD = np.log(FACTOR) / 1.96
+_GRID = np.linspace(-3.2, 3.2, 33)  # standard deviations of the logarithm of a level
+_MIN_FREEDOM = 0.02  # of a residual, 1 - leverage
 
 
 class Noise(NamedTuple):
-    """How noisy a measured curve is: two levels, estimated from the scatter about the fit.
+    """Noise level of a measured curve.
 
-    The variance of a residual is share^2 + (absolute * steepness)^2. `share` is the error of the
-    measured stress relative to its scale, `absolute` that of the closure (m), which `steepness`
-    (1/m) turns into one of stress; a curve without a steepness has the first alone. Levels that
-    are `known` are not estimated.
+    The variance of a residual is relative^2 + (absolute * log_slope)^2.
+
+    relative: standard error of the stress relative to its scale.
+    absolute: standard error of the closure in m; `Series.log_slope` (1/m) converts it to one of
+        the stress. Zero for a curve whose displacement is taken as exact.
+    is_known: whether the levels are known and not estimated.
     """
 
-    share: float
+    relative: float
     absolute: float = 0.0
-    known: bool = False
+    is_known: bool = False
 
 
 class Series(NamedTuple):
-    """One measured quantity of a test: what it is, the noise it is expected to carry, for each of
-    its residuals, (n,), the steepness of the curve there (1/m), and the number of points.
+    """One measured quantity of a test.
+
+    quantity: its name.
+    expected: the expected noise.
+    log_slope: slope of the curve (1/m) at each residual, (n,).
+    n_points: number of measured points.
     """
 
-    what: str
+    quantity: str
     expected: Noise
-    steepness: Array
-    points: int
+    log_slope: Array
+    n_points: int
 
 
 def estimate_noise(series: Series, residual: Array, leverage: Array) -> Noise:
-    """Levels that the residuals (n,) of a fit with these leverages (n,) make most likely.
+    """Estimate the noise levels of a series from the residuals of a fit.
 
-    Both have wide priors from what instruments do, because eight points cannot tell two levels by
-    themselves. Restricted likelihood: a point of leverage h has the residual variance
-    (1 - h) sigma^2.
+    Both levels have wide priors from the accuracy of instruments, because eight points cannot
+    determine two levels. Restricted likelihood: the residual of a point of leverage h has the
+    variance (1 - h) sigma^2.
+
+    Parameters
+    ----------
+    series: the measured quantity.
+    residual, leverage: (n,) each.
     """
     expected = series.expected
-    if expected.known:
+    if expected.is_known:
         return expected
-    free = np.clip(1 - leverage, 0.02, 1.0)
-    share, absolute = (level * np.exp(_GRID * _SD) for level in expected[:2])
-    variance = share[:, None, None] ** 2 + (absolute[:, None] * series.steepness) ** 2
-    loss = np.sum(free * np.log(variance) + residual**2 / variance, axis=-1)
+    freedom = np.clip(1 - leverage, _MIN_FREEDOM, 1.0)
+    relative, absolute = (level * np.exp(_GRID * _LOG_SD) for level in expected[:2])
+    variance = relative[:, None, None] ** 2 + (absolute[:, None] * series.log_slope) ** 2
+    loss = np.sum(freedom * np.log(variance) + residual**2 / variance, axis=-1)
     loss = loss + _GRID[:, None] ** 2 + _GRID[None, :] ** 2
     i, j = np.unravel_index(int(np.argmin(loss)), loss.shape)
-    return Noise(float(share[i]), float(absolute[j]))
+    return Noise(float(relative[i]), float(absolute[j]))

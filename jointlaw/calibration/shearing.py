@@ -1,4 +1,4 @@
-"""Shear tests by a law: all joints together, along their own displacements and normal stresses."""
+"""Simulated direct shear tests of a law, all tests of a fit in one batch of joints."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,53 +11,87 @@ from ..laws.joint_law import JointLaw
 from ..support.checks import Array
 
 TOLERANCE = 1e-9  # of the normal stress
-Path = tuple[Array, Array, NDArray[np.intp]]
 
 
-class Sheared(NamedTuple):
-    """A shear test by a law: displacement (m), shear stress (Pa), opening (m), (rows,) each; and
-    the rows of the measured points (n,).
+class ShearPath(NamedTuple):
+    """Prescribed path of a shear test.
+
+    shear: displacement in m, (rows,).
+    normal: normal stress in Pa, (rows,).
+    points: rows of the measured points, (n,).
     """
 
-    way: Array
+    shear: Array
+    normal: Array
+    points: NDArray[np.intp]
+
+
+class SimulatedTest(NamedTuple):
+    """A shear test simulated with a law.
+
+    shear: displacement in m, (rows,).
+    stress: shear stress in Pa, (rows,).
+    opening: in m, (rows,), from the start of shear.
+    points: rows of the measured points, (n,).
+    """
+
+    shear: Array
     stress: Array
     opening: Array
     points: NDArray[np.intp]
 
     @property
     def dilation(self) -> float:
-        """Largest opening over shear of a step: the tangent of the dilation angle."""
-        moves = np.abs(np.diff(self.way))
-        return float(np.max(np.diff(self.opening)[moves > 0] / moves[moves > 0]))
+        """Tangent of the largest dilation angle: largest opening over slip of a step."""
+        slip = np.abs(np.diff(self.shear))
+        return float(np.max(np.diff(self.opening)[slip > 0] / slip[slip > 0]))
 
 
-def shear_all(law: JointLaw, paths: Sequence[Path]) -> list[Sheared]:
-    """Tests by a law of one plane, each along its `ShearCurve.path`, one joint each.
+def simulate_shear(law: JointLaw, paths: Sequence[ShearPath]) -> list[SimulatedTest]:
+    """Simulate shear tests, one joint each.
 
-    Raises ValueError where a law cannot follow, with the remedy.
+    Parameters
+    ----------
+    law: a law with a plane.
+    paths: path of each test.
+
+    Raises ValueError, with the remedy, if the law cannot follow a path.
     """
-    longest = max(way.size for way, _, _ in paths)
-    padded = ((np.pad(x, (0, longest - x.size), mode="edge") for x in path[:2]) for path in paths)
-    way, normal = (np.stack(columns, -1) for columns in zip(*padded, strict=True))
-    joints, scale = law.joints(len(paths), ledger=False), normal.max(axis=0)
-    moves, step = np.diff(way, axis=0, prepend=0.0), np.zeros((len(paths), 2))
-    stress, closure = np.empty(way.shape), np.empty(way.shape)
-    for k, move in enumerate(moves):
-        with np.errstate(divide="ignore", invalid="ignore"):  # the last dilation goes on
-            guess = np.nan_to_num(step[:, 0] * move / step[:, 1], posinf=0.0, neginf=0.0)
-        step[:, 0], step[:, 1] = guess, move
+    rows = max(path.shear.size for path in paths)
+    shear = np.stack([_padded(path.shear, rows) for path in paths], -1)
+    normal = np.stack([_padded(path.normal, rows) for path in paths], -1)
+    joints = law.joints(len(paths), ledger=False)
+    scale = normal.max(axis=0)
+    increments = np.diff(shear, axis=0, prepend=0.0)
+    step = np.zeros((len(paths), 2))
+    stress = np.empty(shear.shape)
+    closure = np.empty(shear.shape)
+    for row, increment in enumerate(increments):
+        # first guess of the closure increment: the dilation of the previous step
+        with np.errstate(divide="ignore", invalid="ignore"):
+            guess = np.nan_to_num(step[:, 0] * increment / step[:, 1], posinf=0.0, neginf=0.0)
+        step[:, 0] = guess
+        step[:, 1] = increment
+        condition = NormalCondition(normal[row], scale)
         try:
-            step[:, 0] = closing_increments(
-                joints, step, NormalCondition(normal[k], scale), TOLERANCE
-            )
+            step[:, 0] = closing_increments(joints, step, condition, TOLERANCE)
             F, _ = joints.update(step, tangent=False)
         except ArithmeticError as error:
             raise ValueError(
-                f"no joint of mu = {law.asperity.mu:.3g} and a = {law.orientation.a:.3g} follows "
-                f"this shear test ({error}); hold one of them, or check the units of the test"
+                f"no joint with mu = {law.asperity.mu:.3g} and a = {law.orientation.a:.3g} can "
+                f"follow this shear test ({error}); fix one of them, or check the units of the test"
             ) from error
-        stress[k], closure[k] = F[:, 1], joints.delta[:, 0]
-    return [
-        Sheared(way[:n, k], stress[:n, k], closure[0, k] - closure[:n, k], points)
-        for k, (n, points) in enumerate((path[0].size, path[2]) for path in paths)
-    ]
+        stress[row] = F[:, 1]
+        closure[row] = joints.delta[:, 0]
+    return [_unpadded(path, stress[:, k], closure[:, k]) for k, path in enumerate(paths)]
+
+
+def _padded(values: Array, rows: int) -> Array:
+    """Values extended to this number of rows by the last one."""
+    return np.pad(values, (0, rows - values.size), mode="edge")
+
+
+def _unpadded(path: ShearPath, stress: Array, closure: Array) -> SimulatedTest:
+    """The test of one path from the padded columns of its joint."""
+    rows = path.shear.size
+    return SimulatedTest(path.shear, stress[:rows], closure[0] - closure[:rows], path.points)

@@ -1,11 +1,25 @@
-"""Tables in the files of laboratories, text and spreadsheets: their columns and odd rows.
+"""Tables in laboratory files, text and spreadsheets: their tests, columns and outliers.
 
-- Names stand in one line, units in it or in the next one: "tau [kPa]", "tau (kPa)", "tau /kPa",
-  "tau in kPa", "tau_kPa". A column without a unit is asked for, never guessed.
-- Lines of text above the names are skipped. A sheet holds several tests if the names come again,
-  beside the first ones or below them; a workbook holds those of all its sheets.
-- Separators, decimal marks and marks between thousands: `jointlaw.support.text_numbers`, also for
-  cells of text in a workbook.
+Laboratories have no common file format. This module reads any table with a line of names, and its
+principle is that a value is never guessed where two readings are possible: the file is refused, and
+the message names the option of the command that decides. The reasons behind the rules:
+
+- **Names.** A column is found by the aliases of its quantity, tried in order. If two columns have
+  the same name, or none has a known one, the user names the column.
+- **Units** are part of the name ("tau [kPa]", "tau (kPa)", "tau /kPa", "tau in kPa", "tau_kPa") or
+  are in the next line. A column without a unit is refused: a stress in kPa that is read as MPa
+  gives a law, and no later check detects the error.
+- **Several tests.** A table ends where its line of names is repeated below it (`_split_stacked`),
+  and is divided where its first name is repeated beside it (`_split_side_by_side`). A workbook has
+  the tests of all its sheets. Text above the names is skipped.
+- **Outliers.** Data loggers write numbers such as -999 for a lost reading, repeat the last value,
+  or produce single jumps; spreadsheets end with a summary row ("Max"). All of these are numbers,
+  and fits would follow them. They are detected by three tests, each against the other values of the
+  column: a sentinel value that is far from the others; a jump that returns while another column
+  continues (`_find_jumps`); a word in a column of numbers. Because a real event may look the same,
+  detected rows are refused until the user decides (`--outliers skip` or `keep`).
+- **Numbers.** Separators, decimal number_format and thousands separators: `support.text_numbers`. Cells of
+  text in a workbook follow the same rules.
 """
 
 import re
@@ -31,190 +45,243 @@ from ..support.text_numbers import (
 )
 
 _UNIT = r"(?:[numkcMGµμ]?(?:Pa|m)|N/mm[2²]|[kM]N/m[2²]|bar|[kmg]pa|[kM]N)"
-_ROW_UNIT = re.compile(rf"[\[(].*[\])]|/?\s*{_UNIT}|N|-?")
+_UNIT_CELL = re.compile(rf"[\[(].*[\])]|/?\s*{_UNIT}|N|-?")
 _TITLE = re.compile(
     rf"(.*?)(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|(?:\s*/\s*|\s+in\s+|,\s*|_|\s+)({_UNIT}))\s*"
 )
 _LETTERS = re.compile(r"[^\W\d_]")
-# what loggers write where they read nothing, or more than they can
+# numbers that loggers write for a lost reading or an overflow
 _SENTINEL = re.compile(r"-99\.0|-?(9{3,}(\.0|\.9+|\.25)|(3276[78]|65535)\.0)")
 _WORD = re.compile(r"(?i)(?!nan|none|null).*[^\W\d_]{3}.*")
 # a formula in a sheet of a workbook, saved by a program that cannot compute
-_NO_VALUE = re.compile(
+_FORMULA_WITHOUT_VALUE = re.compile(
     rb'<c(?![^>]*t="str")[^>]*><f[^>]*(?:/>|>[^<]*</f>)\s*(?:<v\s*/>|<v></v>)?\s*</c>'
 )
-APART = 0.1  # of the range of all others: how far from them such a number stands
-JUMP, STILL = 0.2, 0.1  # of the range; of the jump, what the other column is off by
-RUN = 5  # equal values that may jump together, a quarter of the rows at most
-Rows = dict[int, list[str]]
+MAX_SENTINEL_DISTANCE = 0.1  # of the range of the other values: a nearer number is a measurement
+MIN_JUMP = 0.2  # of the range of the column
+MAX_OTHER_DEVIATION = 0.1  # of the jump: deviation of another column in the same row
+MAX_RETURN_DIFFERENCE = 0.25  # of the jump: difference of the values before and after it
+MAX_JUMP_ROWS = 5  # equal values that a jump may have, at most a quarter of the rows
+MIN_ROWS = 3  # of a test
+Rows = dict[int, list[str]]  # cells by the number of the line
 
 
 class Column(NamedTuple):
-    """A column: its title as written, its name and unit ("" if it gives none).
+    """A column of a table.
 
-    values: (n,), NaN where a cell is empty; wrong: what is wrong with the first cell that is
-    neither empty nor a number, with its line; odd: lines whose value stands for none, such as -999.
+    title: as written in the file; name and unit: its two parts, unit "" if it has none.
+    values: (n,), NaN where a cell is empty.
+    error: what is wrong with the first cell that is neither empty nor a number, or "".
+    sentinels: lines whose value stands for a lost reading, such as -999, each with the reason.
     """
 
     title: str
     name: str
     unit: str
     values: Array
-    wrong: str
-    odd: dict[int, str]
+    error: str
+    sentinels: dict[int, str]
 
 
-class Asked(NamedTuple):
-    """A quantity to look for: what it is, its SI unit, names it goes by, the option that names it.
+class Quantity(NamedTuple):
+    """A measured quantity, and how to find its column.
 
-    The names are tried in their order, in small letters with _ for all that is no letter or digit.
-    Names in `vague` count only where no other column has a unit of the same kind.
+    description: of the quantity, in messages.
+    si_unit: its unit in SI.
+    aliases: names of its column, tried in order; lower case, with _ for all characters that are
+        neither letters nor digits.
+    option: the command-line option that names its column.
+    ambiguous_aliases: names that count only if no other column has a unit of the same kind.
     """
 
-    what: str
-    base: str
-    names: tuple[str, ...]
+    description: str
+    si_unit: str
+    aliases: tuple[str, ...]
     option: str
-    vague: tuple[str, ...] = ()
+    ambiguous_aliases: tuple[str, ...] = ()
 
 
-class Table(NamedTuple):
-    """One test of a file: what to call it, its columns, the line (or row) of each of their values,
-    lines that are no measurement, with the reason, and notes on what else is in the file.
+class FileTable(NamedTuple):
+    """One test in a file.
+
+    name: of file, sheet and test, in messages.
+    columns: its columns.
+    lines: line (or row) number of each value.
+    summary_rows: lines that are no measurement, such as "Max", each with the reason.
+    notes: on other contents of the file.
     """
 
     name: str
     columns: list[Column]
     lines: list[int]
-    odd: dict[int, str]
+    summary_rows: dict[int, str]
     notes: tuple[str, ...] = ()
 
-    def column(self, asked: Asked, given: str | None = None) -> Column:
-        """The column of a quantity, in SI units. Raises ValueError with the option that helps.
+    def column(self, quantity: Quantity, override: str | None = None) -> Column:
+        """The column of a quantity, with its values in SI units.
 
-        given: name and unit from the command line, "Disp:mm", or None.
+        override: name and unit from the command line, "Disp:mm", or None. Raises ValueError with
+        the option that helps.
         """
-        unit, found = (given or "").partition(":")[2], self.named(asked, given)
-        example = f'{asked.option} "NAME:{units.COMMON[asked.base]}"'
-        if len(found) != 1:
-            many = f"{len(found)} columns of one name: " if found else ""
+        matches = self.find_columns(quantity, override)
+        example = f'{quantity.option} "NAME:{units.COMMON[quantity.si_unit]}"'
+        if len(matches) != 1:
+            several = f"{len(matches)} columns of one name: " if matches else ""
+            titles = ", ".join(column.title for column in self.columns)
             raise ValueError(
-                f"{self.name}: which column is the {asked.what}, and in which unit? The file has "
-                f"{many}{', '.join(c.title for c in self.columns)}; write for example {example}"
+                f"{self.name}: which column is the {quantity.description}, and in which unit? The "
+                f"file has {several}{titles}; write for example {example}"
             )
-        column = found[0]
-        if column.wrong:
-            raise ValueError(f"{self.name}: column {column.title!r}, {column.wrong}")
-        unit = unit or column.unit
-        factor = _factor(unit, asked.base)
+        column = matches[0]
+        if column.error:
+            raise ValueError(f"{self.name}: column {column.title!r}, {column.error}")
+        unit = (override or "").partition(":")[2] or column.unit
+        factor = _si_factor(unit, quantity.si_unit)
         if factor is None:
-            trouble = f"has the unit {unit!r}, none of {asked.base}" if unit else "gives no unit"
+            problem = f"has the unit {unit!r}, none of {quantity.si_unit}"
             raise ValueError(
-                f"{self.name}: column {column.title!r} {trouble}; name it, for example "
-                f"{example.replace('NAME', column.name)}"
+                f"{self.name}: column {column.title!r} {problem if unit else 'gives no unit'}; "
+                f"name it, for example {example.replace('NAME', column.name)}"
             )
         return column._replace(values=column.values * factor)
 
-    def named(self, asked: Asked, given: str | None = None) -> list[Column]:
-        """The columns of that name given, or of the first of its names that any column has."""
-        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
-        vague = asked.vague if alike < 2 else ()  # not one of several displacements
-        wanted = (*asked.names, *vague) if given is None else (_plain(given.partition(":")[0]),)
-        matches = (
-            [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
-        )
-        return next((match for match in matches if match), [])
+    def find_columns(self, quantity: Quantity, override: str | None = None) -> list[Column]:
+        """The columns with the name in `override`, or with the first alias that any column has."""
+        aliases: tuple[str, ...]
+        if override is not None:
+            aliases = (_normalised(override.partition(":")[0]),)
+        else:
+            same_kind = [
+                column
+                for column in self.columns
+                if _si_factor(column.unit, quantity.si_unit) is not None
+            ]
+            aliases = quantity.aliases
+            if len(same_kind) < 2:
+                aliases = (*aliases, *quantity.ambiguous_aliases)
+        for alias in aliases:
+            matches = [
+                column
+                for column in self.columns
+                if alias in (_normalised(column.name), _normalised(column.title))
+            ]
+            if matches:
+                return matches
+        return []
 
-    def rows(
+    def complete_rows(
         self, columns: Sequence[Column], outliers: str | None
     ) -> tuple[list[Array], list[str]]:
-        """The rows in which all these columns hold a number, and what was left out of them.
+        """The rows in which all these columns have a number, and notes on the rows left out.
 
-        Odd rows are those of `odd_rows`, and points where one column jumps and returns while
-        another stands still. Raises ValueError as that, and for fewer than three rows.
+        Outliers are the rows of `outlier_rows`, and jumps of one column that return while another
+        column continues. Raises ValueError as `outlier_rows`, and for fewer than three rows.
         """
-        whole = np.isfinite([c.values for c in columns]).all(axis=0)
-        lines, values = np.array(self.lines)[whole], [c.values[whole] for c in columns]
-        seen = ~np.isin(lines, [*self.odd, *(n for c in columns for n in c.odd)])
+        is_complete = np.isfinite([column.values for column in columns]).all(axis=0)
+        lines = np.array(self.lines)[is_complete]
+        values = [column.values[is_complete] for column in columns]
+        sentinel_lines = [line for column in columns for line in column.sentinels]
+        is_measurement = ~np.isin(lines, [*self.summary_rows, *sentinel_lines])
         jumps = dict[int, str]()
-        for (_, x), (c, y) in permutations(zip(columns, values, strict=True), 2):
-            there = lines[seen][_jumps(x[seen], y[seen])].tolist()
-            jumps |= dict.fromkeys(there, f"{c.title} jumps and returns")
-        skipped, told = self.odd_rows(columns, outliers, lines.tolist(), jumps)
+        for (_, x), (column, y) in permutations(zip(columns, values, strict=True), 2):
+            is_jump = _find_jumps(x[is_measurement], y[is_measurement])
+            jump_lines = lines[is_measurement][is_jump].tolist()
+            jumps |= dict.fromkeys(jump_lines, f"{column.title} jumps and returns")
+        skipped, outlier_notes = self.outlier_rows(columns, outliers, lines.tolist(), jumps)
         values = [x[~np.isin(lines, skipped)] for x in values]
-        empty, notes = int(np.sum(~whole)), [*self.notes]
-        if empty:
-            notes.append(f"{empty} of {whole.size} rows without all numbers are not used")
-        notes += told
-        if values[0].size < 3:
+        notes = [*self.notes]
+        incomplete = int(np.sum(~is_complete))
+        if incomplete:
+            notes.append(
+                f"{incomplete} of {is_complete.size} rows without all numbers are not used"
+            )
+        notes += outlier_notes
+        if values[0].size < MIN_ROWS:
             raise ValueError(
-                f"{self.name}: has {values[0].size} rows with both numbers; give 3 or more"
+                f"{self.name}: has {values[0].size} rows with all numbers; give {MIN_ROWS} or more"
             )
         return values, notes
 
-    def odd_rows(
+    def outlier_rows(
         self,
         columns: Sequence[Column],
         outliers: str | None,
         lines: Iterable[int],
-        more: dict[int, str],
+        jumps: dict[int, str],
     ) -> tuple[list[int], list[str]]:
-        """Those of these lines to leave out as no measurement, and a note of them if there are any.
+        """The outliers among some lines that are to be left out, and a note on them.
 
-        They are those of `odd`, values such as -999, and `more` with its reasons. outliers: what to
-        do with them, "skip" or "keep". Raises ValueError naming them without it.
+        Parameters
+        ----------
+        columns: columns whose sentinel values are outliers.
+        outliers: "skip" or "keep" for the treatment of outliers, or None.
+        lines: the lines to look at.
+        jumps: lines with a jump, each with the reason.
+
+        Raises ValueError naming the outliers if `outliers` is None.
         """
-        odd = self.odd | {n: why for c in columns for n, why in c.odd.items()} | more
-        odd = {n: odd[n] for n in sorted(odd.keys() & set(lines))}
-        told = "; ".join(f"line {n}: {why}" for n, why in [*odd.items()][:3])
-        told += f"; and {len(odd) - 3} more" if len(odd) > 3 else ""
-        if odd and outliers is None:
+        sentinels = {line: why for column in columns for line, why in column.sentinels.items()}
+        reasons = self.summary_rows | sentinels | jumps
+        reasons = {line: reasons[line] for line in sorted(reasons.keys() & set(lines))}
+        listed = "; ".join(f"line {line}: {why}" for line, why in [*reasons.items()][:3])
+        if len(reasons) > 3:
+            listed += f"; and {len(reasons) - 3} more"
+        if reasons and outliers is None:
             raise ValueError(
-                f"{self.name}: {told}. Are these measurements? Write --outliers skip to leave such "
-                "rows out, or --outliers keep"
+                f"{self.name}: {listed}. Are these measurements? Write --outliers skip to leave "
+                "such rows out, or --outliers keep"
             )
-        if not odd or outliers == "keep":
+        if not reasons or outliers == "keep":
             return [], []
-        return [*odd], [f"{len(odd)} rows are left out as outliers ({told})"]
+        return [*reasons], [f"{len(reasons)} rows are left out as outliers ({listed})"]
 
 
 def read_tables(
-    path: Path, needed: Sequence[tuple[Asked, str | None]], decimal: str | None = None
-) -> list[Table]:
-    """The tests of a file, by the rules above.
+    path: Path, quantities: Sequence[tuple[Quantity, str | None]], decimal: str | None = None
+) -> list[FileTable]:
+    """Read the tests of a file.
 
-    needed: quantities and what is given for them, as `Table.column` takes them: a table with none
-    of them is no test, and left out with a note, if another has one. decimal: the decimal mark,
-    "comma" or "point"; None finds it, if a number of the file shows it. Raises ValueError naming
-    file, line and remedy.
+    Parameters
+    ----------
+    path: text file or workbook.
+    quantities: quantities of a test, each with the override that `FileTable.column` takes. A table
+        with none of them is no test: it is left out with a note, if another table has one.
+    decimal: decimal mark, "comma" or "point"; None detects it from the numbers of the file.
+
+    Raises ValueError naming file, line and remedy.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        sheets = _workbook(path, decimal)
+        sheets = _read_workbook(path, decimal)
     else:
         lines = read_lines(path)
         mark = find_table_separator(lines)
         sheets = {"": dict(zip(lines, split_cells([*lines.values()], mark), strict=True))}
-    tables: list[Table] = []
+    tables: list[FileTable] = []
     for sheet, rows in sheets.items():
-        marks = detect_format((cell for row in rows.values() for cell in row), decimal)
-        name = f"{path}{', sheet ' * bool(sheet)}{sheet}"
-        blocks = [one for block in _below(rows, marks) for one in _beside(*block)]
-        for k, (titles, below, numbers) in enumerate(blocks, 1):
-            several = f", test {k}" if len(blocks) > 1 else ""
-            tables.append(_table(name + several, titles, below, numbers, marks))
+        number_format = detect_format((cell for row in rows.values() for cell in row), decimal)
+        sheet_name = f"{path}, sheet {sheet}" if sheet else f"{path}"
+        blocks = [
+            part
+            for block in _split_stacked(rows, number_format)
+            for part in _split_side_by_side(block)
+        ]
+        for k, block in enumerate(blocks, 1):
+            name = f"{sheet_name}, test {k}" if len(blocks) > 1 else sheet_name
+            tables.append(_make_table(name, block, number_format))
     if not tables:
         raise ValueError(
             f"{path}: must hold a line of names with units, such as us [mm],tau [MPa], and numbers "
             "in the lines below it"
         )
-    tests = [table for table in tables if any(table.named(*one) for one in needed)] or tables
-    names = {table.name for table in tests}
-    notes = [f"{one.name}: no test, not read" for one in tables if one.name not in names]
+    tests = [table for table in tables if any(table.find_columns(*one) for one in quantities)]
+    tests = tests or tables
+    test_names = {table.name for table in tests}
+    notes = [f"{table.name}: no test, not read" for table in tables if table.name not in test_names]
     return [tests[0]._replace(notes=tuple(notes)), *tests[1:]]
 
 
-def _workbook(path: Path, decimal: str | None) -> dict[str, Rows]:
-    """The cells of all sheets as text. Raises ImportError with the remedy without openpyxl."""
+def _read_workbook(path: Path, decimal: str | None) -> dict[str, Rows]:
+    """Read the cells of all sheets as text. Raises ImportError with the remedy without openpyxl."""
     try:
         from openpyxl import load_workbook
     except ImportError as error:
@@ -224,168 +291,194 @@ def _workbook(path: Path, decimal: str | None) -> dict[str, Rows]:
     try:
         book = load_workbook(path, read_only=True, data_only=True)
         with ZipFile(path) as parts:
-            sheets = [one for one in parts.namelist() if one.startswith("xl/worksheets/")]
-            bare = any(_NO_VALUE.search(parts.read(one)) for one in sheets)
-    except Exception as error:  # of many kinds, for a file that is none
+            sheets = [part for part in parts.namelist() if part.startswith("xl/worksheets/")]
+            lacks_values = any(_FORMULA_WITHOUT_VALUE.search(parts.read(one)) for one in sheets)
+    except Exception as error:  # openpyxl raises many types for an invalid file
         raise ValueError(f"{path}: cannot be read as a spreadsheet ({error})") from None
-    if bare:
+    if lacks_values:
         raise ValueError(
             f"{path}: holds formulas without their values; open it in a spreadsheet program and "
             "save it again"
         )
-    found = dict[str, Rows]()
+    workbook = dict[str, Rows]()
     for sheet in book.worksheets:
         cells = [*enumerate(sheet.iter_rows(values_only=True), 1)]
         texts = (cell.strip() for _, row in cells for cell in row if isinstance(cell, str))
         comma = detect_format(texts, decimal).decimal == ","
-        rows = {n: [_text(cell, comma) for cell in row] for n, row in cells}
-        found[sheet.title] = {n: row for n, row in rows.items() if any(row)}
-    return found
+        rows = {n: [_cell_text(cell, comma) for cell in row] for n, row in cells}
+        workbook[sheet.title] = {n: row for n, row in rows.items() if any(row)}
+    return workbook
 
 
-def _text(cell: Any, comma: bool) -> str:
-    """A cell of a workbook as a text file would have it, with decimal commas or without."""
+def _cell_text(cell: Any, comma: bool) -> str:
+    """A cell of a workbook as text, with a decimal comma or a decimal point."""
     text = "" if cell is None else str(cell).strip()
     if isinstance(cell, float):
-        # the decimal mark of a spreadsheet's number is a point: 1.2010 shows it, 1.201 does not
-        text += "0" * bool(AMBIGUOUS_NUMBER.fullmatch(text))
+        text += "0" * bool(AMBIGUOUS_NUMBER.fullmatch(text))  # 1.2010 cannot be read as 1201
         text = text.replace(".", ",") if comma else text
     return text
 
 
-def _below(rows: Rows, marks: NumberFormat) -> list[tuple[list[str], list[str], Rows]]:
-    """Names, units and rows of the tables that stand below one another."""
-    found: list[tuple[list[str], list[str], Rows]] = []
+class _Block(NamedTuple):
+    """A table of text: titles, the row of units below them (empty if there is none), and rows."""
+
+    titles: list[str]
+    units: list[str]
+    rows: Rows
+
+
+def _split_stacked(rows: Rows, number_format: NumberFormat) -> list[_Block]:
+    """Split the rows of a sheet into tables below one another, each with its line of names."""
+    blocks: list[_Block] = []
     for line, row in rows.items():
-        numeric = any(
-            np.isfinite(marks.value(cell)) or AMBIGUOUS_NUMBER.fullmatch(cell) for cell in row
+        has_numbers = any(
+            np.isfinite(number_format.value(cell)) or AMBIGUOUS_NUMBER.fullmatch(cell)
+            for cell in row
         )
         words = [cell for cell in row if _LETTERS.search(cell)]
-        if found and not found[-1][2] and not numeric and all(map(_ROW_UNIT.fullmatch, row)):
-            found[-1] = (found[-1][0], [cell.strip("[]()/- ") for cell in row], {})
-        elif not numeric and len(words) > 1 and not (found and found[-1][2]):
-            found[-1:] = [(row, [], {})]  # lines of text above it were no names
-        elif not numeric and found and row == found[-1][0]:
-            found.append((row, [], {}))
-        elif found:
-            found[-1][2][line] = row
-    return [block for block in found if block[2]]
+        is_in_table = bool(blocks) and bool(blocks[-1].rows)
+        is_below_titles = bool(blocks) and not is_in_table
+        if is_below_titles and not has_numbers and all(map(_UNIT_CELL.fullmatch, row)):
+            blocks[-1] = blocks[-1]._replace(units=[cell.strip("[]()/- ") for cell in row])
+        elif not has_numbers and len(words) > 1 and not is_in_table:
+            blocks[-1:] = [_Block(row, [], {})]  # earlier lines of text were no names
+        elif not has_numbers and blocks and row == blocks[-1].titles:
+            blocks.append(_Block(row, [], {}))
+        elif blocks:
+            blocks[-1].rows[line] = row
+    return [block for block in blocks if block.rows]
 
 
-def _beside(
-    titles: list[str], below: list[str], rows: Rows
-) -> list[tuple[list[str], list[str], Rows]]:
-    """The tables that stand beside one another: the same names come again."""
-    names = [_plain(title) for title in titles]
+def _split_side_by_side(block: _Block) -> list[_Block]:
+    """Split a table into tests beside one another, each with the same names."""
+    names = [_normalised(title) for title in block.titles]
     starts = [k for k, name in enumerate(names) if name and name == names[0]]
     parts = [slice(a, b) for a, b in zip(starts, [*starts[1:], len(names)], strict=True)]
-    same = {tuple(name for name in names[part] if name) for part in parts}
-    if len(parts) < 2 or len(same) > 1 or len(next(iter(same))) < 2:
-        return [(titles, below, rows)]
+    distinct = {tuple(name for name in names[part] if name) for part in parts}
+    if len(parts) < 2 or len(distinct) > 1 or len(next(iter(distinct))) < 2:
+        return [block]
     return [
-        (
-            titles[part],
-            below[part],
-            {n: cells for n, row in rows.items() if any(cells := row[part])},
+        _Block(
+            block.titles[part],
+            block.units[part],
+            {line: cells for line, row in block.rows.items() if any(cells := row[part])},
         )
         for part in parts
     ]
 
 
-def _table(
-    name: str, titles: list[str], below: list[str], rows: Rows, marks: NumberFormat
-) -> Table:
-    """The columns of one test."""
-    wide = len(titles)
-    for line, row in rows.items():
-        if any(row[wide:]):
+def _make_table(name: str, block: _Block, number_format: NumberFormat) -> FileTable:
+    """The table of one test. Raises ValueError for a row with more cells than names."""
+    width = len(block.titles)
+    for line, row in block.rows.items():
+        if any(row[width:]):
             raise ValueError(
-                f"{name}: line {line} has {len(row)} cells under {wide} names; give each column a "
+                f"{name}: line {line} has {len(row)} cells under {width} names; give each column a "
                 "name and separate all lines alike; if the decimal mark is a comma, separate the "
                 "columns by semicolons"
             )
-    columns, odd = [], dict[int, str]()
-    padded = ([*row, *[""] * wide][:wide] for row in (below, *rows.values()))
-    for title, unit, *cells in zip(titles, *padded, strict=True):
-        column, summaries = _column(title, unit, dict(zip(rows, cells, strict=True)), marks)
+    columns = []
+    summary_rows = dict[int, str]()
+    padded = ([*row, *[""] * width][:width] for row in (block.units, *block.rows.values()))
+    for title, unit, *cells in zip(block.titles, *padded, strict=True):
+        column, summaries = _make_column(
+            title, unit, dict(zip(block.rows, cells, strict=True)), number_format
+        )
         columns.append(column)
-        odd |= summaries
-    return Table(name, columns, [*rows], odd)
+        summary_rows |= summaries
+    return FileTable(name, columns, [*block.rows], summary_rows)
 
 
-def _number_fault(cell: str) -> str:
+def _make_column(
+    title: str, unit: str, cells: dict[int, str], number_format: NumberFormat
+) -> tuple[Column, dict[int, str]]:
+    """A column from its cells by line, and lines with a word such as Max in a column of numbers."""
+    parsed = {line: number_format.value(cell) for line, cell in cells.items()}
+    numbers = {line: x for line, x in parsed.items() if np.isfinite(x)}
+    texts = {line: cell for line, cell in cells.items() if cell and line not in numbers}
+    errors = (
+        f"line {line} holds {cell!r}, which {_number_error(cell)}" for line, cell in texts.items()
+    )
+    words = {line: f"{title} is {cell!r}" for line, cell in texts.items() if _WORD.fullmatch(cell)}
+    candidates = {line: x for line, x in numbers.items() if _SENTINEL.fullmatch(str(x))}
+    others = np.array([x for line, x in numbers.items() if line not in candidates])
+    plausible = {x for x in set(candidates.values()) if others.size and _is_plausible(x, others)}
+    sentinels = {
+        line: f"{title} is {cells[line]}" for line, x in candidates.items() if x not in plausible
+    }
+    values = np.array([*parsed.values()])
+    name, column_unit = _split_title(title, unit)
+    column = Column(title, name, column_unit, values, next(errors, ""), sentinels)
+    return column, words if len(texts) < len(numbers) else {}
+
+
+def _number_error(cell: str) -> str:
     """Why a cell is not read as a number, for a message."""
     return AMBIGUITY_REMEDY if AMBIGUOUS_NUMBER.fullmatch(cell) else "is no number"
 
 
-def _column(
-    title: str, unit: str, cells: dict[int, str], marks: NumberFormat
-) -> tuple[Column, dict[int, str]]:
-    """A column from its cells by line; and lines that hold a word, such as Max, among numbers."""
-    found = {n: marks.value(cell) for n, cell in cells.items()}
-    known = {n: x for n, x in found.items() if np.isfinite(x)}
-    texts = {n: cell for n, cell in cells.items() if cell and n not in known}
-    wrong = (f"line {n} holds {cell!r}, which {_number_fault(cell)}" for n, cell in texts.items())
-    words = {n: f"{title} is {cell!r}" for n, cell in texts.items() if _WORD.fullmatch(cell)}
-    sent = {n: x for n, x in known.items() if _SENTINEL.fullmatch(str(x))}
-    others = np.array([x for n, x in known.items() if n not in sent])
-    near = {x for x in set(sent.values()) if others.size and _near(x, others)}
-    odd = {n: f"{title} is {cells[n]}" for n, x in sent.items() if x not in near}
-    values = np.array([*found.values()])
-    column = Column(title, *_read_title(title, unit), values, next(wrong, ""), odd)
-    return column, words if len(texts) < len(known) else {}
+def _is_plausible(x: float, others: Array) -> bool:
+    """Whether a sentinel value is so close to the others (n,) that it may be a measurement."""
+    return bool(np.min(np.abs(others - x)) <= MAX_SENTINEL_DISTANCE * _value_range(others))
 
 
-def _near(x: float, others: Array) -> bool:
-    """Whether a number stands so near the others (n,) that it may be a measurement as they are."""
-    return bool(np.min(np.abs(others - x)) <= APART * _scale(others))
-
-
-def _scale(y: Array) -> float:
-    """Range of values; what hardly changes scatters, and a fifth of its size counts."""
+def _value_range(y: Array) -> float:
+    """Range of values, at least a fifth of the largest: nearly constant values only scatter."""
     return float(max(np.ptp(y), 0.2 * np.max(np.abs(y))))
 
 
-def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:
-    """Points (n,) where y leaves its neighbours, which agree, while x goes on between its own.
+def _find_jumps(x: Array, y: Array) -> NDArray[np.bool_]:
+    """Points (n,) where y jumps and returns, while x continues between its neighbours.
 
-    Up to `RUN` points of equal y leave them together, as where a logger repeats what it lost.
+    A jump may have several points of equal y, as where a logger repeats its last value.
     """
-    found = np.zeros(x.size, bool)
+    is_outlier = np.zeros(x.size, bool)
     if x.size < 5 or not np.ptp(x) or not np.ptp(y):
-        return found
+        return is_outlier
     first = np.flatnonzero(np.diff(y, prepend=np.nan) != 0)  # rows of each run of equal values
     last = np.append(first[1:], x.size) - 1
-    size, first, last = (last - first + 1)[1:-1], first[1:-1], last[1:-1]
-    before, after = first - 1, last + 1
-    off_y = np.abs(y[first] - (y[after] + y[before]) / 2) / _scale(y)
-    off_x = np.abs(x[first] + x[last] - x[after] - x[before]) / 2 / np.ptp(x)
-    apart = np.abs(y[after] - y[before]) / _scale(y)
-    # and does not turn, as at the end of unloading
-    turns = np.append(0, np.cumsum(np.diff(x)[1:] * np.diff(x)[:-1] < 0))
-    jump = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL * off_y)
-    jump &= (size <= min(RUN, x.size / 4)) & (turns[last] == turns[before])
-    for one, end in zip(first[jump], last[jump], strict=True):
-        found[one : end + 1] = True
-    return found
+    size = (last - first + 1)[1:-1]
+    first = first[1:-1]
+    last = last[1:-1]
+    before = first - 1
+    after = last + 1
+    deviation_y = np.abs(y[first] - (y[after] + y[before]) / 2) / _value_range(y)
+    deviation_x = np.abs(x[first] + x[last] - x[after] - x[before]) / 2 / np.ptp(x)
+    difference = np.abs(y[after] - y[before]) / _value_range(y)
+    # a reversal of x, as at the end of unloading, is no jump
+    reversals = np.append(0, np.cumsum(np.diff(x)[1:] * np.diff(x)[:-1] < 0))
+    is_jump = (deviation_y > MIN_JUMP) & (difference < MAX_RETURN_DIFFERENCE * deviation_y)
+    is_jump &= deviation_x < MAX_OTHER_DEVIATION * deviation_y
+    is_jump &= size <= min(MAX_JUMP_ROWS, x.size / 4)
+    is_jump &= reversals[last] == reversals[before]
+    for start, end in zip(first[is_jump], last[is_jump], strict=True):
+        is_outlier[start : end + 1] = True
+    return is_outlier
 
 
-def _factor(unit: str, base: str) -> float | None:
-    """SI units per unit; a quantity, -1mm, turns a sign; None for one of another kind."""
+def _si_factor(unit: str, si_unit: str) -> float | None:
+    """SI units per unit; None for a unit of another kind.
+
+    A quantity such as -1mm is a factor that changes the sign.
+    """
     unit = re.sub("^([kmg])pa$", lambda match: f"{match[1].upper().replace('K', 'k')}Pa", unit)
     try:
-        return units.parse(unit if re.match(r"[-+.\d]", unit) else f"1{unit or '?'}", base)
+        return units.parse(unit if re.match(r"[-+.\d]", unit) else f"1{unit or '?'}", si_unit)
     except ValueError:
         return None
 
 
-def _read_title(title: str, unit: str) -> tuple[str, str]:
-    """Name and unit of a title, which goes before the row of units: "tau [kPa]", "closure_mm"."""
+def _split_title(title: str, unit: str) -> tuple[str, str]:
+    """Name and unit of a title such as "tau [kPa]" or "closure_mm".
+
+    unit: of the row of units, used if the title has none.
+    """
     match = _TITLE.fullmatch(title)
     if match is None:
         return title, unit
     return match[1].strip(" _,") or title, (match[2] or match[3] or "").strip("-") or unit
 
 
-def _plain(name: str) -> str:
+def _normalised(name: str) -> str:
+    """A name in lower case with _ for all characters that are neither letters nor digits."""
     return re.sub(r"\W+", "_", name.strip().lower()).strip("_")

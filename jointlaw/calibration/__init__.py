@@ -1,17 +1,17 @@
-"""Laboratory tests on a joint, in the order in which measured curves become a law.
+"""Laboratory tests on a joint: from measured curves to a law.
 
-    priors          what is known before: transforms, bounds, 95 % ranges
-    forward         parameters to a law and its closure curve, and back
-    noise           expected levels of noise, and those that the scatter shows
-    shearing        shear tests by a law, all joints together
-    measured        closure and shear curves, and their misfit
-    tables          columns of text files and spreadsheets, and rows that are no measurement
-    datasets        tests in files: those of the package, in data/, and of laboratories
-    envelopes       Coulomb, Barton, a power law, through the same tests
-    problem         what is free, what is held, where to start; least squares with priors
-    estimates       what a fit found: law, intervals, what the data leave open
-    fit             fit_curves; its result in words and a picture
+    priors          prior knowledge: transforms, bounds, 95 % ranges
+    forward         from parameters to a law and its closure curve, and back
+    noise           expected noise levels, and levels estimated from residuals
+    shearing        simulated shear tests, all joints of a fit in one batch
+    measured        closure and shear curves, and their residuals
+    tables          columns of text files and spreadsheets, and outliers
+    datasets        tests in files: the data sets of the package (data/), and laboratory files
+    envelopes       Coulomb, Barton and a power law fitted to the same tests
+    problem         free and fixed parameters, initial values; least squares with priors
+    estimates       the result: law, intervals, parameters that are not identifiable
+    fit             fit_curves; report and figure of the result
     field           a law from JRC, JCS, a friction angle and a stiffness
 
-Each file imports from those above it only.
+Each file imports only from the files above it.
 """

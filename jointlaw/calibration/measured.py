@@ -1,4 +1,4 @@
-"""Measured curves, each with the noise it is expected to carry and what the law says of it."""
+"""Measured curves: their data, expected noise, and residuals of a law."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -7,54 +7,58 @@ from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..laws.joint_law import JointLaw
 from ..parameters.resolution import Resolution
 from ..support.checks import Array, at_least, finite, more_than, number
-from .forward import STEPS, Settings, build, log_stress
+from .forward import INITIAL_STEPS, Settings, build_law, log_stress
 from .noise import Noise, Series
 from .priors import Values
-from .shearing import Sheared, shear_all
+from .shearing import ShearPath, SimulatedTest, simulate_shear
 
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
 CLOSURE_NOISE = 0.005  # of the largest closure: linearity and repeatability of a transducer
 SHEAR_NOISE = 0.02  # of the largest shear stress
-OPENING_NOISE = 0.03  # of the largest opening: a gauge beside a joint that tilts a little
-CELLS = Resolution(10, 10, 24)  # with `STEPS`: shear stress within 0.2 % of finer ones
-MOST_FINER = 4  # times STEPS: from there on the steps alone grow
-FINEST = 0.002  # of the whole way: the first step of shear, and the first after a turn
-_TURN = 0.2  # of the stress at a peak: what falls or rises less is scatter
-_FOOT = 0.02  # of the largest stress: likewise, where the stress is small
-_SLACK = 0.002  # of the largest stress: what is less is none
+OPENING_NOISE = 0.03  # of the largest opening: a gauge beside a joint that tilts slightly
+# resolution of shear tests with `INITIAL_STEPS`: shear stress within 0.2 % of a finer one
+INITIAL_CELLS = Resolution(10, 10, 24)
+MAX_REFINEMENT = 4  # of the cells; beyond, only the steps are refined
+CELLS_PER_STEPS = 0.6  # exponent: the cells are refined with this power of the steps
+SHORTEST_STEP = 0.002  # of the whole shear displacement: at the start and after a reversal
+MIN_STRESS_DROP = 0.2  # of the stress at a peak: a smaller drop is scatter, not a reversal
+MIN_STRESS_DROP_OF_LARGEST = 0.02  # likewise, of the largest stress
+MAX_SLACK_STRESS = 0.002  # of the largest stress: rows with less are slack
+MIN_SHEAR_REVERSAL = 0.02  # of the largest shear displacement: a smaller reversal is scatter
+MIN_CLOSURE_POINTS = 4
+MIN_SHEAR_POINTS = 3
 _COLUMNS = ("shear", "shear_stress", "normal", "opening")
-_BACK = 0.02  # of the largest shear displacement: what goes back less is scatter
 
 
 @dataclass(frozen=True, eq=False)
 class ClosureCurve:
-    """A closure test: normal stress against closure, in first loading or over whole cycles.
+    """A closure test: normal stress against closure, in first loading or over whole load cycles.
 
     Parameters
     ----------
     stress: normal stress in Pa, (n,), >= 0.
-    closure: closure in m, (n,), measured from wherever the test began; unloading left out (see
-        `first_loading`) unless `cycle`.
-    noise: standard error of the stress as a share of it, taken as known, the closure as exact.
-        None expects 1 % of the stress and 0.5 % of the largest closure and estimates both from the
-        scatter.
-    cycle: True for points of whole cycles, loading, unloading and reloading in their order. Only
-        a law with a yield_interference has a loop to fit to them.
-    compliance: of rock and machine, whose strain the test measured too: closure per stress (m/Pa).
-        It is subtracted from `closure` first; 0 where the closure is that of the joint alone.
-    name, notes: of the test in reports, and what was done to its record before.
+    closure: closure in m, (n,), from any origin. Unloading is left out (see `first_loading`) unless
+        `cycle`.
+    noise: known standard error of the stress relative to it; the closure is then taken as exact.
+        None expects 1 % of the stress and 0.5 % of the largest closure, and estimates both from the
+        residuals.
+    cycle: True for whole cycles of loading, unloading and reloading in their order. Only a law with
+        a yield_interference has a hysteresis loop to fit to them.
+    compliance: of rock and machine, whose deformation the test measured too: closure per stress in
+        m/Pa. It is subtracted from `closure`; 0 if the closure is that of the joint alone.
+    name, notes: name of the test in reports, and changes made to its record.
 
-    `seating`, the closure (m) of the law where that of the test is zero, is known of a test whose
-    first row has zero stress; it is None of any other, and fitted. Several such rows are slack:
-    they are left out, and no one knows where touch began.
+    `preload_closure` is the closure (m) of the law at the origin of the measured closure. It is
+    known if the first row has zero stress; otherwise it is None, and fitted. Several rows of zero
+    stress at the beginning are slack: they are left out, and first contact is unknown.
 
-    Raises ValueError for arrays that do not fit, fewer than four points, a branch that unloads
-    without `cycle`, cycles that never unload, or a compliance larger than the curve.
+    Raises ValueError for arrays of different lengths, fewer than four points, unloading without
+    `cycle`, cycles without unloading, or a compliance that exceeds the curve.
 
     >>> curve = jl.ClosureCurve(stress=record.F1[:100], closure=record.closure[:100])
     """
@@ -66,63 +70,90 @@ class ClosureCurve:
     compliance: float = 0.0
     name: str = "closure"
     notes: tuple[str, ...] = ()
-    seating: float | None = field(init=False)
+    preload_closure: float | None = field(init=False)
     series: tuple[Series, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        stress, closure = _equally_long(stress=self.stress, closure=self.closure)
+        stress, closure = _same_length(stress=self.stress, closure=self.closure)
         if (stress < 0).any():
             raise ValueError(f"stress = {stress.min():g} Pa is out of bounds: it must be >= 0")
-        slack = int(np.argmax(stress > _SLACK * stress.max()))
-        if slack > 1:
-            told = f"{slack} rows before any load are slack of {np.ptp(closure[:slack]):.3g} m"
-            set_(self, "notes", (*self.notes, f"{told}: they are not fitted"))
-            stress, closure = stress[slack:], closure[slack:]
-        turns = turning_points(stress)
-        top = turns[1]
-        strain = at_least("compliance", self.compliance, 0.0) * stress
-        if strain[top] - strain[0] > 0 and strain[top] - strain[0] >= closure[top] - closure[0]:
-            raise ValueError(
-                f"compliance = {self.compliance:g} m/Pa gives {strain[top] - strain[0]:g} m up to "
-                f"{stress[top]:g} Pa, the whole closure is {closure[top] - closure[0]:g} m: "
-                "nothing is left for the joint; check its unit, m/Pa"
-            )
-        closure = closure - strain
-        if self.cycle != (len(turns) > 2):
+        stress, closure = self._without_slack(stress, closure)
+        reversals = reversal_rows(stress)
+        peak = reversals[1]
+        closure = self._without_compliance(stress, closure, peak)
+        if self.cycle != (len(reversals) > 2):
             raise ValueError(
                 f"cycle = {self.cycle}, but stress {'never falls' if self.cycle else 'falls'} by a "
-                f"fifth from {stress[top]:g} Pa after point {top}: give cycle=True with loading "
+                f"fifth from {stress[peak]:g} Pa after point {peak}: give cycle=True with loading "
                 "and unloading, or the first loading alone (calibration.measured.first_loading)"
             )
-        # not -0.0
-        set_(self, "seating", 0.0 - float(closure[0]) if stress[0] == 0.0 else None)
-        keep = stress > 0  # a point at zero stress only says where the closure is zero
-        stress, closure = stress[keep], closure[keep]
-        if stress.size < 4 or not np.ptp(closure) > 0:
+        # 0.0 - x, not -x, which may be -0.0
+        preload_closure = 0.0 - float(closure[0]) if stress[0] == 0.0 else None
+        is_loaded = stress > 0  # a point at zero stress only determines the origin of the closure
+        stress = stress[is_loaded]
+        closure = closure[is_loaded]
+        if stress.size < MIN_CLOSURE_POINTS or not np.ptp(closure) > 0:
             raise ValueError(
                 f"stress has {stress.size} points above zero over a closure of "
-                f"{np.ptp(closure) if closure.size else 0:g} m: at least 4 are needed"
+                f"{np.ptp(closure) if closure.size else 0:g} m: at least {MIN_CLOSURE_POINTS} are "
+                "needed"
             )
-        set_(self, "stress", stress)
-        set_(self, "closure", closure)
-        steep = np.zeros(stress.size)
-        ends = [0, *turning_points(stress)[1:-1], stress.size - 1]
+        self._set("preload_closure", preload_closure)
+        self._set("stress", stress)
+        self._set("closure", closure)
+        self._set("series", (self._make_series(stress, closure),))
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _without_slack(self, stress: Array, closure: Array) -> tuple[Array, Array]:
+        """The rows from first contact on; slack rows before it are noted."""
+        slack = int(np.argmax(stress > MAX_SLACK_STRESS * stress.max()))
+        if slack <= 1:
+            return stress, closure
+        note = f"{slack} rows before any load are slack of {np.ptp(closure[:slack]):.3g} m"
+        self._set("notes", (*self.notes, f"{note}: they are not fitted"))
+        return stress[slack:], closure[slack:]
+
+    def _without_compliance(self, stress: Array, closure: Array, peak: int) -> Array:
+        """The closure (n,) of the joint alone. Raises ValueError if none is left.
+
+        peak: row of the first peak of the stress.
+        """
+        deformation = at_least("compliance", self.compliance, 0.0) * stress
+        subtracted = deformation[peak] - deformation[0]
+        if subtracted > 0 and subtracted >= closure[peak] - closure[0]:
+            raise ValueError(
+                f"compliance = {self.compliance:g} m/Pa gives {subtracted:g} m up to "
+                f"{stress[peak]:g} Pa, the whole closure is {closure[peak] - closure[0]:g} m: "
+                "nothing is left for the joint; check its unit, m/Pa"
+            )
+        return closure - deformation
+
+    def _make_series(self, stress: Array, closure: Array) -> Series:
+        """The measured stress, its expected noise and the slope of its logarithm."""
+        slope = np.zeros(stress.size)
+        ends = [0, *reversal_rows(stress)[1:-1], stress.size - 1]
         for start, end in reversed(list(pairwise(ends))):
             branch = slice(start, end + 1)
-            steep[branch] = _steepness(closure[branch], stress[branch])
-        share = stress / np.max(stress) if self.cycle else 1.0  # as `residuals` are
-        usual = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
-        expected = _expected("noise", self.noise, usual)
-        set_(self, "series", (Series("stress", expected, share * steep, steep.size),))
+            slope[branch] = _log_slope(closure[branch], stress[branch])
+        # of the scaled stress, as in `residuals`
+        scaled_slope = (stress / np.max(stress) if self.cycle else 1.0) * slope
+        default = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
+        expected = _expected_noise("noise", self.noise, default)
+        return Series("stress", expected, scaled_slope, scaled_slope.size)
 
     def residuals(self, values: Values, settings: Settings) -> Array:
-        """ln(model/measured), (n,); over cycles (model - measured)/largest measured.
+        """ln(model/measured), (n,); over cycles (model - measured)/largest measured stress.
 
-        values: parameters. settings: what else the fit holds. Unloading ends at zero stress, where
-        a ratio says nothing. Raises nothing.
+        Unloading ends at zero stress, where a logarithm is not defined. Raises nothing.
+
+        Parameters
+        ----------
+        values: values of all parameters by name.
+        settings: properties of the law that are not fitted.
         """
-        model = log_stress(values, values["seating"] + self.closure, settings)
+        model = log_stress(values, values["preload_closure"] + self.closure, settings)
         if not self.cycle:
             return model - np.log(self.stress)
         return (np.exp(model) - self.stress) / np.max(self.stress)
@@ -130,20 +161,20 @@ class ClosureCurve:
 
 @dataclass(frozen=True, eq=False)
 class ShearCurve:
-    """Direct shear at given normal stresses: shear stress, and opening, against displacement.
+    """A direct shear test: shear stress, and opening, against shear displacement.
 
     Parameters
     ----------
-    shear: shear displacement in m, (n,), from zero; it may turn round.
+    shear: shear displacement in m, (n,), from zero; it may reverse.
     shear_stress: in Pa, (n,), not all zero.
-    normal: normal stress in Pa, > 0, (n,); one number is that of all points.
+    normal: normal stress in Pa, > 0; (n,), or one number for all points.
     azimuth: direction of shear in rad, from axis 2 of the law.
-    noise: standard error as a share of the largest shear stress, taken as known; None expects 2 %
-        and estimates the level from the scatter.
-    opening: normal displacement in m, (n,), from where shear began, opening positive; None where
-        it was not measured. Then shear stress alone cannot tell friction from dilation.
-    opening_noise: as `noise`, of the largest opening; None expects 3 %.
-    name, notes: of the test in reports, and what was done to its record before.
+    noise: known standard error relative to the largest shear stress; None expects 2 % and estimates
+        it from the residuals.
+    opening: normal displacement in m, (n,), from the start of shear, opening positive; None if it
+        was not measured. Shear stress alone cannot separate friction from dilation.
+    opening_noise: as `noise`, relative to the largest opening; None expects 3 %.
+    name, notes: name of the test in reports, and changes made to its record.
 
     >>> curve = jl.ShearCurve(sheared.shear, sheared.shear_stress, normal=5e6)
     """
@@ -160,173 +191,236 @@ class ShearCurve:
     series: tuple[Series, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        given = {name: x for name in _COLUMNS if (x := getattr(self, name)) is not None}
+        columns = self._columns()
         if np.ndim(self.normal) == 0:
-            given["normal"] = np.full(np.shape(self.shear), self.normal)
-        for name, values in zip(given, _equally_long(**given), strict=True):
-            set_(self, name, values)
-        if self.shear.size < 3 or not np.ptp(self.shear) > 0:
-            raise ValueError(f"shear has {self.shear.size} points: at least 3 that move are needed")
+            columns["normal"] = np.full(np.shape(self.shear), self.normal)
+        for name, values in zip(columns, _same_length(**columns), strict=True):
+            object.__setattr__(self, name, values)
+        if self.shear.size < MIN_SHEAR_POINTS or not np.ptp(self.shear) > 0:
+            raise ValueError(
+                f"shear has {self.shear.size} points: at least {MIN_SHEAR_POINTS} that move are "
+                "needed"
+            )
         if not self.shear_stress.any():
             raise ValueError("shear_stress is zero throughout: there is no strength to fit")
         more_than("normal", np.min(self.normal), 0.0)
         number("azimuth", self.azimuth)
-        # the displacement is taken as exact; the last residual of the stress is that of the peak
-        n, expected = self.shear.size, _expected("noise", self.noise, Noise(SHEAR_NOISE))
+        # the displacement is taken as exact; the last residual of the stress concerns the peak
+        n = self.shear.size
+        expected = _expected_noise("noise", self.noise, Noise(SHEAR_NOISE))
         series = [Series("stress", expected, np.zeros(n + 1), n)]
         if self.opening is not None:
             if not self.opening.any():
                 raise ValueError("opening is zero throughout: leave it out if it was not measured")
-            expected = _expected("opening_noise", self.opening_noise, Noise(OPENING_NOISE))
+            default = Noise(OPENING_NOISE)
+            expected = _expected_noise("opening_noise", self.opening_noise, default)
             series.append(Series("opening", expected, np.zeros(n), n))
-        set_(self, "series", tuple(series))
+        object.__setattr__(self, "series", tuple(series))
+
+    def _columns(self) -> dict[str, Any]:
+        """The measured columns by name."""
+        return {name: x for name in _COLUMNS if (x := getattr(self, name)) is not None}
 
     @cached_property
-    def turns(self) -> list[int]:
-        """Points where shear turns: the first, those where it does, the last."""
-        way = np.abs(self.shear) > _BACK * np.max(np.abs(self.shear))
-        sense = np.sign(self.shear[int(np.argmax(way))])
-        return [*turning_points(sense * self.shear, 0.0, _BACK)[:-1], self.shear.size - 1]
+    def reversals(self) -> list[int]:
+        """Rows of the first point, of the shear reversals, and of the last point."""
+        is_sheared = np.abs(self.shear) > MIN_SHEAR_REVERSAL * np.max(np.abs(self.shear))
+        first_sense = np.sign(self.shear[int(np.argmax(is_sheared))])
+        rows = reversal_rows(first_sense * self.shear, 0.0, MIN_SHEAR_REVERSAL)
+        return [*rows[:-1], self.shear.size - 1]
 
-    def path(self, steps: int) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Displacement (m) and normal stress (Pa) to take a joint through, (rows,), and the rows of
-        the points (n,).
+    def path(self, steps: int) -> ShearPath:
+        """The path to take a joint through: the measured points, and rows between them.
 
-        Every step ends at a point or within the interval between two. The steps grow with the
-        distance from where shear began or turned: `steps` of them, the shortest `FINEST` of the
-        whole way, take the joint that far. Scatter of the displacement is no way: a point behind
-        those before it is taken where they are. Raises nothing.
+        Every step ends at a point or between two points. The steps grow geometrically with the
+        distance from the start of shear or the last reversal: `steps` of them, the shortest
+        `SHORTEST_STEP` of the whole displacement, cover the whole displacement. Scatter of the
+        displacement is no reversal: a point behind the points before it has their displacement.
+        Raises nothing.
         """
-        whole = float(np.sum(np.abs(np.diff(self.shear[self.turns], prepend=0.0))))
-        grid = whole * np.geomspace(FINEST, 1.0, steps)
-        ways, stresses, rows, start, first = [np.zeros(1)], [self.normal[:1]], list[int](), 0.0, 0
-        for end in self.turns[1:]:
+        whole = float(np.sum(np.abs(np.diff(self.shear[self.reversals], prepend=0.0))))
+        grid = whole * np.geomspace(SHORTEST_STEP, 1.0, steps)
+        displacements = [np.zeros(1)]
+        stresses = [self.normal[:1]]
+        rows = list[int]()
+        start = 0.0
+        first = 0
+        for end in self.reversals[1:]:
             leg = slice(first, end + 1)
             sense = np.sign(self.shear[end] - start)
-            points = np.maximum.accumulate(np.maximum(sense * (self.shear[leg] - start), 0.0))
-            way = np.unique(np.concatenate([grid[grid < points[-1]], points]))
-            rows += (sum(map(len, ways)) + np.searchsorted(way, points)).tolist()
-            ways.append(start + sense * way)
-            stresses.append(np.interp(way, [0.0, *points], [stresses[-1][-1], *self.normal[leg]]))
-            start, first = float(ways[-1][-1]), end + 1
-        return np.concatenate(ways), np.concatenate(stresses), np.array(rows)
+            distance = np.maximum(sense * (self.shear[leg] - start), 0.0)
+            points = np.maximum.accumulate(distance)
+            stops = np.unique(np.concatenate([grid[grid < points[-1]], points]))
+            rows += (sum(map(len, displacements)) + np.searchsorted(stops, points)).tolist()
+            displacements.append(start + sense * stops)
+            normal = [stresses[-1][-1], *self.normal[leg]]
+            stresses.append(np.interp(stops, [0.0, *points], normal))
+            start = float(displacements[-1][-1])
+            first = end + 1
+        return ShearPath(np.concatenate(displacements), np.concatenate(stresses), np.array(rows))
 
-    def predict(self, law: JointLaw, steps: int = STEPS) -> tuple[Array, Array]:
-        """Shear stress (Pa) and opening (m) of a law of its plane at the points, (n,) each.
+    def predict(self, law: JointLaw, steps: int = INITIAL_STEPS) -> tuple[Array, Array]:
+        """Shear stress (Pa) and opening (m) of a law at the measured points, (n,) each.
 
-        law: with a plane. steps: as in `path`. Raises ValueError where the law cannot follow.
+        Parameters
+        ----------
+        law: a law with a plane.
+        steps: as in `path`.
+
+        Raises ValueError if the law cannot follow the test.
         """
-        (test,) = shear_all(law, [self.path(steps)])
+        (test,) = simulate_shear(law, [self.path(steps)])
         return test.stress[test.points], test.opening[test.points]
 
-    def residuals(self, test: Sheared) -> list[Array]:
+    def residuals(self, test: SimulatedTest) -> list[Array]:
         """(model - measured)/largest measured, of shear stress (n + 1,) and opening (n,).
 
-        test: what a law gives. Raises nothing.
-        Last of the stress stands how far the law rises above its stress at the largest measured
-        one before the next points on both sides: few points say by it that the peak lies there.
-        """
-        measured, stress, rows = self.shear_stress, test.stress, test.points
-        top = int(np.argmax(np.abs(measured)))
-        near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
-        rise = np.max(np.sign(measured[top]) * (near - stress[rows[top]]))
-        found = [np.append(stress[rows] - measured, rise) / np.max(np.abs(measured))]
-        if self.opening is not None:
-            found.append((test.opening[rows] - self.opening) / np.max(np.abs(self.opening)))
-        return found
+        The last residual of the stress is the increase of the model above its stress at the
+        measured peak, between the neighbouring points: with few points it is the only information
+        that the peak is there. Raises nothing.
 
-    def thinned(self, most: int) -> Self:
-        """This test with `most` points or a few more: evenly spaced, the peak, turns and ends.
+        test: the test by the law.
+        """
+        largest = np.max(np.abs(self.shear_stress))
+        stress = test.stress
+        rows = test.points
+        peak = int(np.argmax(np.abs(self.shear_stress)))
+        before = rows[max(peak - 1, 0)]
+        after = rows[min(peak + 1, rows.size - 1)]
+        sense = np.sign(self.shear_stress[peak])
+        increase = np.max(sense * (stress[before : after + 1] - stress[rows[peak]]))
+        residuals = [np.append(stress[rows] - self.shear_stress, increase) / largest]
+        if self.opening is not None:
+            difference = test.opening[rows] - self.opening
+            residuals.append(difference / np.max(np.abs(self.opening)))
+        return residuals
+
+    def resampled(self, max_points: int) -> Self:
+        """This test with `max_points` points or a few more: evenly spaced rows, the peak, the
+        reversals and the end points.
 
         Raises nothing.
         """
-        n, top = self.shear.size, int(np.argmax(np.abs(self.shear_stress)))
-        if n <= most:
+        n = self.shear.size
+        if n <= max_points:
             return self
-        even = np.linspace(0, n - 1, most).round().astype(int)
-        kept = np.unique([*even, top, *self.turns])
-        told = f"{kept.size} of {n} rows are fitted: evenly spaced ones, the peak, turns and ends"
-        columns = {name: x[kept] for name in _COLUMNS if (x := getattr(self, name)) is not None}
-        return replace(self, **columns, notes=(*self.notes, told))
+        even = np.linspace(0, n - 1, max_points).round().astype(int)
+        peak = int(np.argmax(np.abs(self.shear_stress)))
+        rows = np.unique([*even, peak, *self.reversals])
+        note = (
+            f"{rows.size} of {n} rows are fitted: evenly spaced rows, the peak, reversals and end "
+            "points"
+        )
+        columns = {name: x[rows] for name, x in self._columns().items()}
+        return replace(self, **columns, notes=(*self.notes, note))
 
 
-def _expected(name: str, known: float | None, usual: Noise) -> Noise:
-    """The noise that is known, or the usual one to begin with."""
-    return usual if known is None else Noise(more_than(name, known, 0.0), 0.0, True)
+def _expected_noise(name: str, known: float | None, default: Noise) -> Noise:
+    """The noise that is known, or the default to begin with."""
+    return default if known is None else Noise(more_than(name, known, 0.0), 0.0, True)
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array]:
-    """Stress (Pa) and closure (m) of the rows, (n,) each, in which a test loads for the first time.
+    """The rows of a closure test in which a stress is reached for the first time.
 
     Unloading is left out, and reloading up to the largest stress before.
+
+    Parameters
+    ----------
+    stress: normal stress in Pa, (n,).
+    closure: in m, (n,).
+
+    Returns stress (Pa) and closure (m) of these rows.
     """
-    s, u = _equally_long(stress=stress, closure=closure)
-    turns, first = turning_points(s), np.zeros(s.size, bool)
-    for low, peak in zip(turns[::2], turns[1::2], strict=False):
-        first[low : peak + 1] = s[low : peak + 1] > np.max(s[:low], initial=-np.inf)
-    return s[first], u[first]
+    s, u = _same_length(stress=stress, closure=closure)
+    reversals = reversal_rows(s)
+    is_first = np.zeros(s.size, bool)
+    for low, peak in zip(reversals[::2], reversals[1::2], strict=False):
+        branch = slice(low, peak + 1)
+        is_first[branch] = s[branch] > np.max(s[:low], initial=-np.inf)
+    return s[is_first], u[is_first]
 
 
-def turning_points(values: Array, share: float = _TURN, foot: float = _FOOT) -> list[int]:
-    """Rows where values (n,) that rise first turn: the first, peaks and lows in turn, the last
-    extreme.
+def reversal_rows(
+    values: Array,
+    min_drop: float = MIN_STRESS_DROP,
+    min_drop_of_largest: float = MIN_STRESS_DROP_OF_LARGEST,
+) -> list[int]:
+    """Rows at which values (n,) that first increase reverse.
 
-    They turn where they fall by this share of a peak and by `foot` of the largest, and where they
-    rise again by as much.
+    These are the first row, maxima and minima in turn, and the last extreme. Values reverse where
+    they fall from a maximum, and where they rise again, by both thresholds.
+
+    Parameters
+    ----------
+    values: (n,).
+    min_drop: smallest drop relative to the maximum.
+    min_drop_of_largest: smallest drop relative to the largest absolute value.
     """
-    turns, extreme, sense = [0], 0, 1
-    least = foot * float(np.max(np.abs(values)))
-    for row, now in enumerate(values):
-        peak = max(values[extreme], values[turns[-1]])
-        if sense * (now - values[extreme]) > 0:
+    rows = [0]
+    extreme = 0
+    sense = 1
+    threshold = min_drop_of_largest * float(np.max(np.abs(values)))
+    for row, value in enumerate(values):
+        maximum = max(values[extreme], values[rows[-1]])
+        if sense * (value - values[extreme]) > 0:
             extreme = row
-        elif sense * (values[extreme] - now) > max(share * peak, least):
-            turns.append(extreme)
-            extreme, sense = row, -sense
-    return [*turns, extreme]
+        elif sense * (values[extreme] - value) > max(min_drop * maximum, threshold):
+            rows.append(extreme)
+            extreme = row
+            sense = -sense
+    return [*rows, extreme]
 
 
-def _equally_long(**given: ArrayLike) -> list[Array]:
-    """Arrays (n,) of finite numbers."""
-    arrays = [finite(name, x, "m, Pa; leave such points out") for name, x in given.items()]
+def _same_length(**columns: ArrayLike) -> list[Array]:
+    """Arrays (n,) of finite numbers. Raises ValueError for other shapes."""
+    arrays = [finite(name, x, "m, Pa; leave such points out") for name, x in columns.items()]
     if arrays[0].ndim != 1 or arrays[0].size == 0 or len({x.shape for x in arrays}) > 1:
         raise ValueError(
-            f"{' and '.join(given)} have shapes {', '.join(str(x.shape) for x in arrays)}: give "
+            f"{' and '.join(columns)} have shapes {', '.join(str(x.shape) for x in arrays)}: give "
             "arrays of one dimension and the same length"
         )
     return arrays
 
 
-def _steepness(closure: Array, stress: Array) -> Array:
-    """d ln(stress)/d closure (1/m) of measured points, smoothed by a power law through them.
+def _log_slope(closure: Array, stress: Array) -> Array:
+    """d ln(stress)/d closure (1/m) at measured points, of a power law fitted to them.
 
-    Differences of neighbouring points would carry the noise into the weights.
+    Differences of neighbouring points would transfer the noise to the weights of the points.
     """
     span = float(np.ptp(closure))
     if not span > 0:
         return np.zeros(closure.size)
     x = (closure - closure.min()) / span
     shifts = np.geomspace(0.02, 5.0, 25)
-    fits = [np.polyfit(np.log(x + s), np.log(stress), 1, full=True) for s in shifts]
-    at = int(np.argmin([float(f[1][0]) if f[1].size else np.inf for f in fits]))
-    return np.abs(float(fits[at][0][0]) / ((x + shifts[at]) * span))
+    fits = [np.polyfit(np.log(x + shift), np.log(stress), 1, full=True) for shift in shifts]
+    misfits = [float(fit[1][0]) if fit[1].size else np.inf for fit in fits]
+    best = int(np.argmin(misfits))
+    exponent = float(fits[best][0][0])
+    return np.abs(exponent / ((x + shifts[best]) * span))
 
 
-def sheared(curves: Sequence[ShearCurve], values: Values, settings: Settings) -> list[Sheared]:
-    """Each test by the law of these values; cells as fine as steps.
+def simulate_curves(
+    curves: Sequence[ShearCurve], values: Values, settings: Settings
+) -> list[SimulatedTest]:
+    """Simulate each test with the law of these values, with cells that are refined with the steps.
 
-    A parameter would take up the error of few cells, degrees of friction, and its interval would
-    not show it.
+    Otherwise the parameters would compensate the error of coarse cells, degrees of friction angle,
+    which their intervals do not include.
     """
-    found: dict[int, Sheared] = {}
-    finer = min(settings.steps / STEPS, MOST_FINER) ** 0.6
+    tests: dict[int, SimulatedTest] = {}
+    refinement = min(settings.steps / INITIAL_STEPS, MAX_REFINEMENT) ** CELLS_PER_STEPS
     for azimuth in {curve.azimuth for curve in curves}:
-        mine = [k for k, curve in enumerate(curves) if curve.azimuth == azimuth]
-        law = build(values, settings, azimuth)
-        r = law.resolution
-        pairs = ((r.u, CELLS.u), (r.phi, CELLS.phi), (r.depth, CELLS.depth))
-        cells = Resolution(*(round(finer * max(pair)) for pair in pairs))
-        paths = [curves[k].path(settings.steps) for k in mine]
-        found |= zip(mine, shear_all(replace(law, resolution=cells), paths), strict=True)
-    return [found[k] for k in range(len(curves))]
+        members = [k for k, curve in enumerate(curves) if curve.azimuth == azimuth]
+        law = build_law(values, settings, azimuth)
+        resolution = law.resolution
+        pairs = (
+            (resolution.u, INITIAL_CELLS.u),
+            (resolution.phi, INITIAL_CELLS.phi),
+            (resolution.depth, INITIAL_CELLS.depth),
+        )
+        refined = Resolution(*(round(refinement * max(pair)) for pair in pairs))
+        paths = [curves[k].path(settings.steps) for k in members]
+        simulated = simulate_shear(replace(law, resolution=refined), paths)
+        tests |= zip(members, simulated, strict=True)
+    return [tests[k] for k in range(len(curves))]

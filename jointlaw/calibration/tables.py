@@ -18,7 +18,7 @@ the message names the option of the command that decides. The reasons behind the
   column: a sentinel value that is far from the others; a jump that returns while another column
   continues (`_find_jumps`); a word in a column of numbers. Because a real event may look the same,
   detected rows are refused until the user decides (`--outliers skip` or `keep`).
-- **Numbers.** Separators, decimal number_format and thousands separators: `support.text_numbers`. Cells of
+- **Numbers.** Separators, decimal marks and thousands separators: `support.text_numbers`. Cells of
   text in a workbook follow the same rules.
 """
 

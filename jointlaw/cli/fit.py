@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import presets
 from ..calibration import datasets
-from ..calibration.envelopes import FORMS, envelope, peak_and_last
+from ..calibration.envelopes import ENVELOPES, envelope_strength, peak_and_last
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
@@ -172,7 +172,7 @@ def _read_shear_tests(options: argparse.Namespace) -> list[ShearCurve]:
     tests = []
     for path, normal_stress in zip(options.shear, normal_stresses, strict=True):
         for test in datasets.read_shear(path, normal_stress=normal_stress, **format_options):
-            tests.append(test.thinned(MAX_SHEAR_POINTS))
+            tests.append(test.resampled(MAX_SHEAR_POINTS))
     if options.peaks:
         tests += datasets.read_peaks(options.peaks, options.decimal, options.outliers)
     return tests
@@ -216,12 +216,12 @@ def _report_predictions(fit: Fit, fitted: list[ShearCurve], predicted: list[Shea
         measured = peak_and_last(curve.shear_stress)
         normal = float(np.mean(curve.normal))
         predictions = [peak_and_last(test.stress)]
-        predictions += [envelope(form, fitted, normal) for form in FORMS]
+        predictions += [envelope_strength(form, fitted, normal) for form in ENVELOPES]
         cells = [curve.name, "{:.4g}, {:.4g}".format(*(measured / 1e6))]
         for prediction in predictions:
             cells.append("{:+.1f}, {:+.1f} %".format(*(100 * (prediction / measured - 1))))
         rows.append(" | ".join(cells))
-    head = f"test | peak, last (MPa) | law | {' | '.join(FORMS)}"
+    head = f"test | peak, last (MPa) | law | {' | '.join(ENVELOPES)}"
     introduction = (
         "Errors of the predicted peak and last shear stress, for tests that were not fitted:"
     )

@@ -186,11 +186,11 @@ def summary_of(folder):
 
 
 def test_the_first_loading_is_fitted_and_the_rest_predicted(tmp_path, cycle, capsys):
-    """The test begins at zero stress, so the seating closure is known."""
+    """The test begins at zero stress, so the closure at preload is known."""
     assert main(["fit", "loop.csv", "--set", "alpha=3.8", "--up-to", "5MPa", "--out", "o"]) == 0
     out = capsys.readouterr().out
     summary = summary_of(tmp_path / "o")
-    assert (summary["version"], summary["parameters_SI"]["seating"]) == (2, 0.0)
+    assert (summary["version"], summary["parameters_SI"]["preload_closure"]) == (2, 0.0)
     above = np.count_nonzero(cycle.F1[:13] > 5e6)
     assert f"Held out: {above} points" in out
     error = 100 * summary["error_at_largest_stress"]

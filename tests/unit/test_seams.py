@@ -12,7 +12,7 @@ import pytest
 from kinds import PARAMETERS, off_default
 
 import jointlaw as jl
-from jointlaw.calibration.forward import build, log_stress, parameters
+from jointlaw.calibration.forward import build_law, log_stress, parameters_of_law
 from jointlaw.kernels import reference
 
 STEP = 2e-7  # m
@@ -111,10 +111,10 @@ def test_a_fit_keeps_it_or_refuses(pair):
     law, _ = pair
     if not isinstance(law, jl.JointLaw):
         with pytest.raises(ValueError, match=r"^law: .* cannot be fitted"):
-            parameters(law)
+            parameters_of_law(law)
         return
-    values, settings = parameters(law)
-    assert build(values, settings, law.plane) == law
+    values, settings = parameters_of_law(law)
+    assert build_law(values, settings, law.plane) == law
     closure = np.array([0.3e-6, 1e-6])
     stress = [law.normal_stress(u) for u in closure]
     assert np.exp(log_stress(values, closure, settings)) == pytest.approx(stress, rel=1e-6)

@@ -77,6 +77,30 @@ def test_each_contact_has_the_history_of_a_joint_of_its_own(any_law):
     assert len(pool.batch) <= 10  # places are used again
 
 
+def test_places_without_keys_are_used_again_and_keep_their_history(law):
+    pool = jl.JointPool(law)
+    first, second, third = pool.allocate(3)
+    pool.batch.update(np.full((3, law.dim), 1e-7))
+    keyed = pool.add(["key"])
+    assert len(pool) == 4
+    pool.release([second, first])
+    assert len(pool) == 2
+    np.testing.assert_array_equal(pool.allocate(1), [first])  # the lowest free place
+    closures = pool.batch.delta[:, 0]
+    assert closures.tolist() == [0.0, 0.0, 1e-7, 0.0]
+    for places in ([second], keyed, [third, third], [9]):  # free, of a key, twice, out of bounds
+        with pytest.raises(ValueError, match="places name"):
+            pool.release(places)
+    with pytest.raises(ValueError, match="n = -1"):
+        pool.allocate(-1)
+    with pytest.raises(ValueError, match="mated=False"):
+        pool.allocate(1, mated=False)
+    assert len(pool) == 3
+    np.testing.assert_array_equal(pool.batch.delta[:, 0], closures)
+    pool.release([third])
+    assert pool.keys == ["key"]
+
+
 def test_a_snapshot_restores_a_pool_and_what_is_refused_changes_none(law):
     pool = jl.JointPool(law)
     pool.batch.update(np.eye(3) * 1e-7, where=pool.add("abc"))

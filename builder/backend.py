@@ -1,4 +1,4 @@
-"""Build backend: setuptools, and before it the library of the compiled law.
+"""Build backend: setuptools, after the libraries of the compiled law and of the block demo.
 
 Where no C compiler of this machine works, the package `ziglang` is asked for, which is one. A wheel
 with the library fits every Python of its platform; without one it fits every platform.
@@ -20,10 +20,12 @@ ROOT = Path(__file__).parents[1]
 TARGET = "JOINTLAW_TARGET"  # a wheel for another machine: one of build.TARGETS
 
 
-# jointlaw/native/build.py without jointlaw/__init__.py, whose imports need numpy
-package = sys.modules["jointlaw"] = ModuleType("jointlaw")
-package.__path__ = [str(ROOT / "jointlaw")]
+# The builders without the __init__.py of their packages, whose imports need numpy
+for name in ("jointlaw", "dem_demo"):
+    package = sys.modules[name] = ModuleType(name)
+    package.__path__ = [str(ROOT / name)]
 build = importlib.import_module("jointlaw.native.build")
+demo_build = importlib.import_module("dem_demo.native.build")
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
@@ -36,16 +38,21 @@ def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
 get_requires_for_build_editable = get_requires_for_build_wheel
 
 
-def _library() -> bool:
-    """Build the library beside its sources; whether there is one."""
-    shutil.rmtree(build.BUILT, ignore_errors=True)
+def _build_libraries() -> bool:
+    """Build the libraries of the law and of the block demo beside their sources.
+
+    Returns whether a compiler was found.
+    """
+    for folder in (build.BUILT, demo_build.BUILT):
+        shutil.rmtree(folder, ignore_errors=True)
     build.write_headers()
     target = os.environ.get(TARGET)
     compiler = build.zig(target) if target else build.find_compiler()
     if compiler is None:
         print("no C compiler works here: numpy's kernel remains", file=sys.stderr)
         return False
-    print(build.build(compiler), "by", *compiler.command, file=sys.stderr)
+    for builder in (build, demo_build):
+        print(builder.build(compiler), "by", *compiler.command, file=sys.stderr)
     return True
 
 
@@ -56,7 +63,7 @@ def build_wheel(
     # setuptools would add what an earlier build left there
     shutil.rmtree(ROOT / "build", ignore_errors=True)
     settings = dict(config_settings or {})
-    if _library():
+    if _build_libraries():
         target = os.environ.get(TARGET)
         platform = build.TARGETS[target] if target else sysconfig.get_platform()
         tags = ["--python-tag", "py3", "--plat-name", platform.replace("-", "_").replace(".", "_")]
@@ -68,5 +75,5 @@ def build_editable(
     wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None
 ) -> str:
     """An editable install, with the library beside its sources."""
-    _library()
+    _build_libraries()
     return build_meta.build_editable(wheel_directory, config_settings, metadata_directory)

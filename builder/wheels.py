@@ -1,8 +1,8 @@
 """Wheels for other machines: `python builder/wheels.py FOLDER`, with the extra `wheels` installed.
 
 One for each of `TARGETS` in jointlaw/native/build.py. Each is built from the source archive, in a
-place of its own, by the packages of this environment, and holds all widths of vectors. Its library
-is looked into: for which processor it is, and what it exports.
+place of its own, by the packages of this environment, and holds all widths of vectors. Its
+libraries are checked: their processor, and the functions that they export.
 """
 
 import os
@@ -15,7 +15,10 @@ import backend
 import lief
 
 ROOT = Path(__file__).parents[1]
-EXPORTED = {"jlaw_run", "jlaw_lanes", "jlaw_levels", "jlaw_sources"}  # what library.py calls
+EXPORTED = {  # functions that library.py and dem_demo/compiled.py call
+    "jointlaw": {"jlaw_run", "jlaw_lanes", "jlaw_levels", "jlaw_sources"},
+    "dem_demo": {"dem_sources", "dem_move_blocks", "dem_finish_step", "dem_find_candidates"},
+}
 PROCESSORS = {"x86_64": "X86_64", "aarch64": "ARM64"}  # of zig, and of lief
 
 
@@ -27,18 +30,19 @@ def build_wheel(target: str, folder: Path) -> Path:
 
 
 def faults(wheel: Path, target: str) -> list[str]:
-    """What is wrong with the library in a wheel."""
+    """What is wrong with the libraries in a wheel."""
     processor, system = backend.build.Compiler((), target).machine
-    with zipfile.ZipFile(wheel) as packed:
-        library = lief.parse(
-            packed.read(f"jointlaw/native/built/{backend.build.library_name(system)}")
-        ).abstract
     found = []
-    # Mach-O writes an underscore before each name
-    if missing := EXPORTED - {one.name.removeprefix("_") for one in library.exported_functions}:
-        found.append(f"it does not export {', '.join(sorted(missing))}")
-    if (built := library.header.architecture.name) != PROCESSORS[processor]:
-        found.append(f"it is for {built}")
+    for package, builder in (("jointlaw", backend.build), ("dem_demo", backend.demo_build)):
+        name = f"{package}/native/built/{builder.library_name(system)}"
+        with zipfile.ZipFile(wheel) as packed:
+            library = lief.parse(packed.read(name)).abstract
+        # Mach-O writes an underscore before each name
+        exported = {function.name.removeprefix("_") for function in library.exported_functions}
+        if missing := EXPORTED[package] - exported:
+            found.append(f"{name} does not export {', '.join(sorted(missing))}")
+        if (architecture := library.header.architecture.name) != PROCESSORS[processor]:
+            found.append(f"{name} is for {architecture}")
     return found
 
 

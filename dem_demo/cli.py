@@ -162,7 +162,7 @@ def _new(given: argparse.Namespace) -> None:
 def _check(given: argparse.Namespace) -> None:
     sim = Simulation(load(given.scene))
     _announce(sim)
-    for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows, strict=True):
+    for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows_by_law, strict=True):
         pressed = sim.joints.traction[rows, 0].max(initial=0.0)
         if isinstance(law, JointLaw):
             _warn_of_range(name, law, float(pressed))

@@ -1,91 +1,95 @@
-"""The compiled step of the blocks: `jointlaw/native/blocks.c`, and its arrays.
+"""Calls the compiled step of the blocks, `dem_demo/native/blocks.c`.
 
-Python owns every array. The library is told where they lie, so they are changed in place; a new
-list of contacts has new arrays, in a new `World`.
+Python owns every array, and the library holds their addresses: arrays are changed in place. When
+the number of contacts changes there are new arrays, and a new `StepArrays` with their addresses.
 """
 
 import ctypes
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jointlaw.native.library import load
+from jointlaw.native.build import Compiler
 
+from .native import build, layout
 from .scene import SceneError
 
-SHOWN = 6  # of a joint: shares sliding, slipping, separated; J/m2 stored, lost; damage of its bond
-NUMBERS = "blocks", "corners", "contacts", "driven"
-REALS = (
-    "thickness", "corner_length", "soft", "parts", "dashpot_normal", "dashpot_shear", "max_path",
-    "max_stale",
-)  # fmt: skip
-ARRAYS = (
-    "motion", "velocity", "renewed", "force", "last", "inertia", "gravity", "loads", "lightness",
-    "reach", "skin", "deepest", "mobile", "urgent",
-    "local", "way", "side", "block", "before", "after", "placed", "turned",
-    "corner", "edge", "a", "b", "at", "normal", "pull", "closure", "length", "twist", "opening",
-    "sliding", "rise", "carried", "inside", "own", "was", "offset", "out",
-    "pools", "law", "place", "touch", "reduction", "traction", "delta", "shares", "area", "lost",
-    "checked", "rows", "axes", "aim", "energy",
-)  # fmt: skip
-FOUND = "fast", "deep", "moved", "stale", "stiffer"
+REBUILD = "run `python -m dem_demo.native` to build it anew"
+DOUBLE = ctypes.c_double
+INTEGER = ctypes.c_longlong
+POINTER = ctypes.c_void_p
+# Arguments of each function after the `StepArrays`, and what it returns
+FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
+    "locate_contacts": ([], None),
+    "next_contacts": ([POINTER] * 2, None),
+    "update_contacts": ([], None),
+    "find_candidates": ([INTEGER, *[POINTER] * 4, INTEGER, *[POINTER] * 4], INTEGER),
+    "set_increments": ([DOUBLE], None),
+    "move_blocks": ([DOUBLE], None),
+    "read_joints": ([], None),
+    "compute_forces": ([DOUBLE], None),
+    "finish_step": ([DOUBLE], None),
+}
 
 
-class Pool(ctypes.Structure):
-    """`jl_pool` of blocks.h."""
+class LawJointArrays(ctypes.Structure):
+    """`dem_law_joints` of layout.h: arrays of the joints of one law."""
 
-    _fields_ = [
-        *((name, ctypes.c_void_p) for name in ("d", "F", "shown", "stress", "stiffness")),
-        *((name, ctypes.c_longlong) for name in ("points", "holds")),
-    ]
+    _fields_ = [(name, field.ctype) for name, field in layout.LAW_JOINTS.items()]
 
 
-class World(ctypes.Structure):
-    """`jl_world` of blocks.h, which describes its arrays."""
+class StepArrays(ctypes.Structure):
+    """`dem_step` of layout.h: numbers of a step, and addresses of its arrays."""
 
-    _fields_ = [
-        *((name, ctypes.c_longlong) for name in NUMBERS),
-        *((name, ctypes.c_double) for name in REALS),
-        *((name, ctypes.c_void_p) for name in ARRAYS),
-        *((name, ctypes.c_longlong) for name in FOUND),
-    ]
+    _fields_ = [(name, field.ctype) for name, field in layout.STEP.items()]
 
     def bind(self, holder: Any = None, *names: str, **arrays: Any) -> None:
-        """Tell the library where arrays lie, and keep them: those of these names of an object, and
-        others."""
+        """Store the addresses of arrays, and keep the arrays alive.
+
+        names: of attributes of `holder` that are arrays; arrays: others, by their field.
+        """
         arrays |= {name: getattr(holder, name) for name in names}
-        self.__dict__.setdefault("held", {}).update(arrays)
+        self.__dict__.setdefault("bound_arrays", {}).update(arrays)
         for name, array in arrays.items():
             setattr(self, name, address(array))
 
     def call(self, name: str, *arguments: Any) -> Any:
-        """Call `jl_blocks_NAME`."""
-        return getattr(library(), f"jl_blocks_{name}")(ctypes.byref(self), *arguments)
+        """Call the function `dem_NAME` of the library with these arrays."""
+        return getattr(library(), f"dem_{name}")(ctypes.byref(self), *arguments)
 
 
 def address(array: Any) -> int:
-    """Where the numbers of an array begin, of numpy or of ctypes."""
+    """Address of the numbers of an array, of numpy or of ctypes.
+
+    Raises ValueError for an array that is not contiguous.
+    """
     if not isinstance(array, np.ndarray):
         return ctypes.addressof(array)
     if not array.flags.c_contiguous:
-        raise ValueError("an array of the compiled step must lie in one piece")
+        raise ValueError("an array of the compiled step must be contiguous")
     return array.ctypes.data
 
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
-    """The library. Raises SceneError where it was not built."""
-    loaded = load()
-    if loaded is None:
+    """The library. Raises SceneError where it was not built, or was built from other sources."""
+    path: Path = build.BUILT / build.library_name(Compiler(()).machine[1])
+    if not path.exists():
         raise SceneError(
-            "blocks need the compiled library: install a C compiler or `pip install ziglang`, then "
-            "run `python -m jointlaw.native`"
+            f"blocks need their compiled library, and {path} is missing: install a C compiler or "
+            f"`pip install ziglang`, then {REBUILD}"
         )
-    for name in ("press", "before", "forces", "after"):
-        getattr(loaded, f"jl_blocks_{name}").argtypes = [ctypes.c_void_p, ctypes.c_double]
-    whole, array = ctypes.c_longlong, ctypes.c_void_p
-    loaded.jl_blocks_following.argtypes = [array] * 3
-    loaded.jl_blocks_find.argtypes = [array, whole, *[array] * 4, whole, *[array] * 4]
-    loaded.jl_blocks_find.restype = whole
+    try:
+        loaded = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise SceneError(f"{path} cannot be loaded here ({error}): {REBUILD}") from error
+    loaded.dem_sources.restype = ctypes.c_char_p
+    if loaded.dem_sources().decode() != build.hash_sources():
+        raise SceneError(f"{path} was built from other sources than are installed here: {REBUILD}")
+    for name, (arguments, result) in FUNCTIONS.items():
+        function = getattr(loaded, f"dem_{name}")
+        function.argtypes = [POINTER, *arguments]
+        function.restype = result
     return loaded

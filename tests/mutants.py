@@ -27,7 +27,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 HOME = Path(tempfile.gettempdir()) / f"mutants-{hashlib.sha256(bytes(ROOT)).hexdigest()[:8]}"
-BUILT = "jointlaw/native/built"
+BUILT = {"jointlaw": "jointlaw/native/built", "dem_demo": "dem_demo/native/built"}
 COVERAGE = """\
 [run]
 source = jointlaw, dem_demo
@@ -127,7 +127,8 @@ class Copy:
         shutil.rmtree(self.at, ignore_errors=True)
         command = ["git", "checkout-index", "--all", f"--prefix={self.at}/"]
         subprocess.run(command, cwd=ROOT, check=True)
-        shutil.copytree(ROOT / BUILT, self.at / BUILT)
+        for built in BUILT.values():
+            shutil.copytree(ROOT / built, self.at / built)
 
     def python(self, *arguments, limit=None):
         """Run Python there, with 4 GiB of memory; exit status and what it wrote."""
@@ -143,20 +144,20 @@ class Copy:
         plain = "-q", "-p", "no:cacheprovider", "-p", "no:randomly"
         return self.python("pytest", *plain, *arguments, **limit)
 
-    def library(self):
+    def library(self, package):
         """The bytes of the library without the hash of its sources and the linker's."""
-        (made,) = (self.at / BUILT).glob("libjointlaw.*")
+        (made,) = (self.at / BUILT[package]).glob("lib*")
         return re.sub(rb"[0-9a-f]{16}|GNU\0.{20}", b"", made.read_bytes(), flags=re.DOTALL)
 
     def judge(self, name, fault, tests, limit):
         """What comes of a file with a fault, and the first test that sees it."""
-        file, native = self.at / name, "native" in name
-        before, library = file.read_bytes(), self.library()
+        file, native, package = self.at / name, "native" in name, Path(name).parts[0]
+        before, library = file.read_bytes(), native and self.library(package)
         try:
             file.write_bytes(fault)
-            if native and self.python("jointlaw.native")[0]:
+            if native and self.python(f"{package}.native")[0]:
                 return "cannot be built", ""
-            if file.suffix != ".py" and self.library() == library:
+            if file.suffix != ".py" and self.library(package) == library:
                 return "the same library", ""
             (self.at / "chosen").write_text("\n".join(tests))
             status, said = self.pytest("-x", "-n0", "-m", "", "@chosen", limit=limit)
@@ -167,7 +168,8 @@ class Copy:
         finally:
             file.write_bytes(before)
             if native:
-                shutil.copytree(ROOT / BUILT, self.at / BUILT, dirs_exist_ok=True)
+                built = BUILT[package]
+                shutil.copytree(ROOT / built, self.at / built, dirs_exist_ok=True)
 
 
 def tests_of_lines(marks):
@@ -206,7 +208,7 @@ def main():
     root, counts = copies[0].at, collections.Counter()
     for where in (root / one for one in options.where):
         for path in [where] if where.is_file() else sorted(where.rglob("*.*")):
-            if path.suffix in (".py", ".c", ".h") and BUILT not in str(path):
+            if path.suffix in (".py", ".c", ".h") and "built" not in path.parts:
                 made = (in_python if path.suffix == ".py" else in_c)(path.read_bytes())
                 for line, *fault in made:
                     found[str(path.relative_to(root)), line].add(tuple(fault))
@@ -218,7 +220,9 @@ def main():
         for name, line, statement, start, end, new in drawn:
             text, runs = (copied.at / name).read_bytes(), name
             if not statement:
-                runs = "dem_demo/compiled.py" if "blocks" in name else "jointlaw/kernels/engine.py"
+                runs = (
+                    "dem_demo/compiled.py" if "dem_demo" in name else "jointlaw/kernels/engine.py"
+                )
             of_file = lines.get(runs, {})
             ran = not statement or statement in of_file
             tests = ran and (of_file.get(statement) or set().union(*of_file.values()) or every)

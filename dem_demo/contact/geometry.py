@@ -1,129 +1,180 @@
-"""Corners on edges: overlap, closure, sliding and contact length. No law, no pymunk.
+"""Geometry of contacts: closure, sliding and length of joint at corners on edges.
 
-A contact is a corner over the line of an edge of another block. Its closure is the depth of the
-corner below that line, so closure, shear and force share one normal and the work of the force on
-the blocks is the work done on the joint. Where two edges lie on each other, the ends of their
-overlap are such corners, and each carries half of the overlap; a corner that stands on an edge
-carries a fixed length. In between the length changes smoothly with the tilt, and wherever it
-changes it carries energy: `pull` and `twist` are its derivatives, and minus the stored energy per
-length times these acts on the blocks, so that no energy is made or lost.
+A contact is one corner over the line of one edge of another block. It is the simplest element that
+keeps work and force consistent: its closure is the depth of the corner below the line, and closure,
+shear and force share one normal, so the work of the force on the blocks is the work that the joint
+takes up. An edge-to-edge contact needs no element of its own. Where two edges lie on each other,
+the two ends of their overlap are corners on edges, and each carries half of the overlap, so the
+pair bears force and moment.
 
-`jointlaw/native/blocks.c` works it out. Vectors are complex numbers x + iy here: conj(p) q holds
-their dot product and their cross product.
+The length of joint that a contact stands for therefore depends on how the corner meets the edge:
+
+- a side of the corner that lies on the edge, tilted by less than 2 degrees: half of its overlap;
+- a corner that stands on the edge, its sides tilted by more than 5 degrees: a fixed length;
+- in between, and within `transition_length` of the end of an edge: a smooth interpolation.
+
+Any change of this length changes the stored energy of the contact. Minus the stored energy per
+length times the derivative of the length is hence a force, which acts on the two blocks
+(`length_gradient`, `length_per_rotation`). Without it, rocking blocks would gain or lose energy.
+
+A corner belongs to an edge only within a range, outside of which a neighbouring corner or edge is
+in the same place (see `manager.py`). The margin to either end of the range is computed here with
+the rest, in one pass.
+
+The geometry is computed by `native/blocks.c`. Vectors are complex numbers x + iy here: conj(p) q
+holds their dot product (real part) and cross product (imaginary part).
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from ..compiled import World, address
+from ..compiled import StepArrays, address
+from ..native.layout import CONSTANTS
 from ..scene import Block
 
-TIE = 1e-9  # sine of an angle that is none but for rounding, as in blocks.c
+PARALLEL_SINE = CONSTANTS["PARALLEL_SINE"].value
 
 
 class Outlines:
-    """Corners of all blocks in one list: edge i starts at corner i and ends at corner after[i].
+    """Corners and edges of all blocks, c in all; edge i starts at corner i and ends at next[i].
 
-    local (c,): corners from the centroids; way (c,): directions of the edges; side (c,): their
-    lengths; block, before, after (c,): numbers; start (blocks + 1,): first corner of each block,
-    and c. corner_length (m): of joint at a corner that stands on an edge; soft (m): over which the
-    end of one edge gives way to that of another.
+    local_corner (c,): corners relative to the centroids (m), complex; local_direction (c,): unit
+    vectors of the edges, complex; both before any rotation. edge_length (c,) in m. block, previous,
+    next (c,): block of each corner, and the corners before and after it. first_corner (blocks +
+    1,): number of the first corner of each block, and c. corner_position, edge_direction (c,): at
+    the present motion, written by the compiled step. corner_length (m): length of joint at a corner
+    that stands on an edge; transition_length (m): distance over which one corner gives way to
+    another.
     """
 
-    def __init__(self, blocks: Sequence[Block], corner_length: float, soft: float) -> None:
-        self.corner_length, self.soft = corner_length, soft
+    def __init__(
+        self, blocks: Sequence[Block], corner_length: float, transition_length: float
+    ) -> None:
+        self.corner_length = corner_length
+        self.transition_length = transition_length
         sizes = np.array([len(block.corners) for block in blocks])
-        self.start = np.concatenate([[0], np.cumsum(sizes)])
+        self.first_corner = np.concatenate([[0], np.cumsum(sizes)])
         self.block = np.repeat(np.arange(len(blocks)), sizes)
-        each = np.split(np.arange(self.start[-1]), self.start[1:-1])
-        self.after, self.before = (
-            np.concatenate([np.roll(corners, by) for corners in each]) for by in (-1, 1)
-        )
-        self.local = np.concatenate([block.local for block in blocks]) @ [1, 1j]
-        edge = self.local[self.after] - self.local
-        self.side = np.abs(edge)
-        self.way = edge / self.side
-        self.placed, self.turned = np.empty((2, len(edge)), complex)  # corners and ways now
+        corners_of_blocks = np.split(np.arange(self.first_corner[-1]), self.first_corner[1:-1])
+        self.next = np.concatenate([np.roll(corners, -1) for corners in corners_of_blocks])
+        self.previous = np.concatenate([np.roll(corners, 1) for corners in corners_of_blocks])
+        self.local_corner = np.concatenate([block.local for block in blocks]) @ [1, 1j]
+        edge = self.local_corner[self.next] - self.local_corner
+        self.edge_length = np.abs(edge)
+        self.local_direction = edge / self.edge_length
+        self.corner_position = np.empty(len(edge), complex)
+        self.edge_direction = np.empty(len(edge), complex)
 
-    def world(self, motion: np.ndarray, contacts: int = 0) -> World:
-        """What the compiled step knows of them at a motion (6, n), and of how many contacts."""
-        world = World(blocks=len(self.start) - 1, corners=len(self.block), contacts=contacts,
-                      corner_length=self.corner_length, soft=self.soft)  # fmt: skip
-        world.bind(self, "local", "way", "side", "block", "before", "after", "placed", "turned",
-                   motion=np.ascontiguousarray(motion, float))  # fmt: skip
-        return world
+    def step_arrays(self, motion: np.ndarray, contacts: int = 0) -> StepArrays:
+        """Arguments of the compiled step for these outlines.
+
+        motion: (6, blocks); contacts: how many there are.
+        """
+        arrays = StepArrays(
+            n_blocks=len(self.first_corner) - 1,
+            n_corners=len(self.block),
+            n_contacts=contacts,
+            corner_length=self.corner_length,
+            transition_length=self.transition_length,
+        )
+        arrays.bind(
+            self, "local_corner", "local_direction", "edge_length", "block", "previous", "next",
+            "corner_position", "edge_direction", motion=np.ascontiguousarray(motion, float),
+        )  # fmt: skip
+        return arrays
 
 
 class Contacts:
-    """k corners on edges at a motion of the blocks; SI units, vectors complex.
+    """k contacts of corners with edges, at a motion of the blocks; SI units, vectors complex.
 
-    corner, edge (k,): numbers in the outlines; a, b (k,): their blocks, a < b.
-    at (k,): place; normal (k,): from block a to block b; closure (k,): positive when pressed
-    together; length (k,): of the joint that the contact stands for; was (k,): the same before
-    corners went on to other edges, when last followed; pull (k,) vector and twist (k,): derivatives
-    of the length by displacement (at the contact) and rotation of b relative to a; opening, sliding
-    (k,): velocity of b relative to a along the normal and a quarter turn clockwise from it. Of the
-    sides (2, k), the edges that meet at the corner: rise, sine of the angle to the edge; carried,
-    length of joint of a side that lies on the edge (m); inside (m), what the corner is away from
-    the limit behind it in terms of its depth; beyond it the next corner takes over if `own`, else
-    the next edge.
+    corner, edge (k,): numbers in the outlines.
+    block_a, block_b (k,): their blocks, block_a < block_b.
+    position (k,): of the corner; normal (k,): unit vector from block a to block b.
+    closure (k,): depth of the corner below the line of the edge, positive when pressed together.
+    length (k,): of the joint that the contact stands for; previous_length (k,): the same before
+    corners went on to other edges in the last update.
+    length_gradient (k,), length_per_rotation (k,): derivatives of the length by displacement and by
+    rotation of b relative to a, at the contact.
+    opening_rate, sliding_rate (k,): velocity of b relative to a along the normal, and along the
+    direction a quarter turn clockwise from it.
+
+    Arrays (2, k) run over the two sides, the edges that meet at the corner. tilt_sine: sine of the
+    angle between side and edge; overlap_length: length of joint where that side lies on the edge;
+    range_margin (m): depth by which the corner is the deeper one within its range; beyond the range
+    another corner takes over if `corner_takes_over`, else another edge.
     """
 
     def __init__(
         self, outlines: Outlines, corner: np.ndarray, edge: np.ndarray, motion: np.ndarray
     ) -> None:
-        """Corners (k,) on edges (k,) for a motion (6, n) of the blocks."""
-        self.outlines, k = outlines, len(corner)
-        self.corner, self.edge = np.array(corner, np.int64), np.array(edge, np.int64)
-        self.a, self.b, out = np.empty((3, k), np.int64)
-        self.at, self.normal, self.pull = np.empty((3, k), complex)
-        self.closure, self.length, self.was, self.twist, self.opening, self.sliding = np.empty(
-            (6, k)
-        )
-        self.rise, self.carried, self.inside = np.empty((3, 2, k))
-        self.own = np.empty((2, k), bool)
-        arrays = {name: a for name, a in vars(self).items() if isinstance(a, np.ndarray)}
-        self.world = outlines.world(motion, k)
-        self.world.bind(**arrays, out=out)
-        self.world.call("place")
+        """Contacts of corners (k,) with edges (k,) at a motion (6, blocks)."""
+        k = len(corner)
+        self.outlines = outlines
+        self.corner = np.array(corner, np.int64)
+        self.edge = np.array(edge, np.int64)
+        self.block_a = np.empty(k, np.int64)
+        self.block_b = np.empty(k, np.int64)
+        self.position = np.empty(k, complex)
+        self.normal = np.empty(k, complex)
+        self.closure = np.empty(k)
+        self.length = np.empty(k)
+        self.previous_length = np.empty(k)
+        self.length_gradient = np.empty(k, complex)
+        self.length_per_rotation = np.empty(k)
+        self.opening_rate = np.empty(k)
+        self.sliding_rate = np.empty(k)
+        self.tilt_sine = np.empty((2, k))
+        self.overlap_length = np.empty((2, k))
+        self.range_margin = np.empty((2, k))
+        self.corner_takes_over = np.empty((2, k), bool)
+        own_arrays = {name: a for name, a in vars(self).items() if isinstance(a, np.ndarray)}
+        self.step_arrays = outlines.step_arrays(motion, k)
+        self.step_arrays.bind(**own_arrays, work_rows=np.empty(k, np.int64))
+        self.step_arrays.call("locate_contacts")
 
     @property
     def codes(self) -> np.ndarray:
-        """One number (k,) for corner and edge of each contact."""
+        """One number (k,) for the pair of corner and edge of each contact."""
         return self.corner * len(self.outlines.block) + self.edge
 
     @property
-    def way(self) -> np.ndarray:
-        """Directions (k,) of the edges."""
-        return self.outlines.turned[self.edge]
+    def edge_direction(self) -> np.ndarray:
+        """Directions (k,) of the edges, complex unit vectors."""
+        return self.outlines.edge_direction[self.edge]
 
     @property
-    def edges(self) -> np.ndarray:
-        """The edges (k, 2) that meet, in the order of their blocks: of the two at a corner the
-        flatter one counts."""
-        flatter = np.where(
-            self.rise[0] < self.rise[1] - TIE, self.outlines.before[self.corner], self.corner
-        )
-        return np.sort([flatter, self.edge], axis=0).T
+    def edge_pairs(self) -> np.ndarray:
+        """The two edges (k, 2) whose faces meet, in the order of their blocks.
 
-    def following(self) -> np.ndarray:
-        """One number (k,), as in `codes`, for what comes next at the nearer limit of each range."""
-        corner, edge = np.empty((2, len(self.corner)), np.int64)
-        self.world.call("following", address(corner), address(edge))
+        Of the two sides of the corner, the one with the smaller tilt.
+        """
+        first_is_flatter = self.tilt_sine[0] < self.tilt_sine[1] - PARALLEL_SINE
+        side = np.where(first_is_flatter, self.outlines.previous[self.corner], self.corner)
+        return np.sort([side, self.edge], axis=0).T
+
+    def next_codes(self) -> np.ndarray:
+        """Codes (k,) of the contacts that come next at the nearer limits of the ranges."""
+        corner = np.empty(len(self.corner), np.int64)
+        edge = np.empty(len(self.corner), np.int64)
+        self.step_arrays.call("next_contacts", address(corner), address(edge))
         return corner * len(self.outlines.block) + edge
 
     def assemble(self, motion: np.ndarray, push, shear, energy=0.0) -> np.ndarray:
-        """Forces and torques (blocks, 3) at a motion (6, blocks).
+        """Forces and torques (blocks, 3) on the blocks at a motion (6, blocks), in N and N m.
 
-        Block b is pushed by `push` (N) along the normal and by `shear` (N) in the sense of sliding,
-        block a by the opposite at the same place; energy (J/m): stored per length.
+        push, shear (k,) in N: forces on block b along the normal and in the direction of sliding;
+        the opposite acts on block a at the same position. energy (k,) in J/m: stored energy per
+        length of joint.
         """
-        force = (push - 1j * shear) * self.normal - energy * self.pull
-        couple = energy * self.twist
-        centre = motion[0] + 1j * motion[1]
-        on_a, on_b = (((self.at - centre[x]).conj() * force).imag for x in (self.a, self.b))
-        x, y = force.real, force.imag
-        parts = np.concatenate([-x, x, -y, y, couple - on_a, on_b - couple])
-        place = (3 * np.concatenate([self.a, self.b]) + np.arange(3)[:, None]).ravel()
+        force = (push - 1j * shear) * self.normal - energy * self.length_gradient
+        couple = energy * self.length_per_rotation
+        centroid = motion[0] + 1j * motion[1]
+        torque_on_a = ((self.position - centroid[self.block_a]).conj() * force).imag
+        torque_on_b = ((self.position - centroid[self.block_b]).conj() * force).imag
+        x = force.real
+        y = force.imag
+        parts = np.concatenate([-x, x, -y, y, couple - torque_on_a, torque_on_b - couple])
+        rows = np.concatenate([self.block_a, self.block_b])
+        place = (3 * rows + np.arange(3)[:, None]).ravel()
         return np.bincount(place, parts, 3 * motion.shape[1]).reshape(-1, 3)

@@ -1,8 +1,12 @@
-"""The law's side: one batch of joints per law, one call per law and step.
+"""Joints of contacts: one pool of joints for each law, advanced by one call per law and step.
 
-Contacts come and go; each keeps its place in the batch of its law for as long as its interface is
-in reach, so history is never given to the wrong joint. A place that falls free goes to a later
-contact, whose joint starts anew.
+The law advances joints in batches, and contacts come and go. Each contact therefore holds a place
+in the pool of its law for as long as it lasts (`jl.JointPool`), so its history is never given to
+another joint. A released place goes to a later contact, whose joint starts as new.
+
+The compiled step writes the displacement increments of all contacts to their places, and reads
+tractions and measures from there: arrays of a law run over the places of its pool, arrays of
+`Joints` over the contacts.
 """
 
 from functools import lru_cache
@@ -14,15 +18,18 @@ import jointlaw as jl
 from jointlaw.joints.state import JointState
 from jointlaw.kernels.engine import Step
 
-from ..compiled import SHOWN, Pool, World, address
+from ..compiled import LawJointArrays, StepArrays, address
+from ..native.layout import MEASURES
 from ..scene import Law, Scene, opens_to
 
-PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
+MAX_STRESS = 2e9  # Pa: end of the tabulated curves, more than any corner of rock bears
+MIN_CLOSURE = 1e-9  # m: closure from which the stick predictor takes its derivative
+STATE_PARTS = "states", "fingerprint"  # saved for the joints of each law
 
 
 @lru_cache(maxsize=64)
 def tabulate_unmated_loading(law: Law) -> dict[str, np.ndarray]:
-    """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met."""
+    """Closure since first touch (m) and work (J/m2) of a joint whose faces have never met."""
     closure = tabulate_first_loading(law)["closure"]
     batch = law.joints(len(closure), mated=False)
     batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
@@ -31,13 +38,14 @@ def tabulate_unmated_loading(law: Law) -> dict[str, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def tabulate_first_loading(law: Law) -> dict[str, np.ndarray]:
-    """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
-    than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
+    """First-loading curve of a law from zero closure to `MAX_STRESS`, by columns.
 
-    At a given normal stress the unsheared joint is the stiffest one (Phi' is a concave function of
-    Phi), so the virgin curve bounds the sheared joint as well.
+    "closure" in m, normal "stress" in Pa, "work" in J/m2, and "stiffness" in Pa/m, an upper bound.
+
+    At a given normal stress the unsheared joint is the stiffest one, because Phi' is a concave
+    function of Phi. The stiffness on this curve therefore bounds sheared joints as well.
     """
-    top = float(law.closure(2e9))
+    top = float(law.closure(MAX_STRESS))
     closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
     stress = law.normal_stress(closure)
     return {
@@ -80,230 +88,314 @@ def stiffness_bound(law: Law, closure: np.ndarray, reduction: float) -> np.ndarr
 
 
 class LawJoints:
-    """The joints of one law: batch, and by their places there what the compiled step needs.
+    """The joints of one law, at their places in a pool.
 
-    step: d (places, 2) in m, F (places, 2) in Pa and shown (places, 8), of one step of all; silent:
-    the same without shown; free: places without a contact, the lowest last; curve: the law's virgin
-    curve.
+    pool: `jl.JointPool` of the law; curve: its first-loading curve, by columns.
+    step: one step of all places: d (places, 2) in m, F (places, 2) in Pa, and `shown`
+    (places, 6 + 2), measures and displacements. silent_step: the same without `shown`.
     """
 
     def __init__(self, law: Law, reduction: float) -> None:
-        self.batch, self.free = jl.JointBatch(law, 0), []
+        self.law = law
         self.curve = {**tabulate_first_loading(law)}
         self.curve["stiffness"] = stiffness_bound(law, self.curve["closure"], reduction)
-        self.grow(0)
+        self.clear()
 
-    def grow(self, n: int) -> None:
-        """Make room for n joints; those that are there keep what they show."""
-        held = len(self.batch)
-        self.free = [*range(n - 1, held - 1, -1), *self.free]
-        self.batch.resize(n)
-        d, F, shown = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, SHOWN + 2))
-        if held:
-            F[:held], shown[:held] = self.step.F, self.step.shown
-        self.step = Step(d, F, None, shown=shown)
-        self.silent = Step(d, F, None)
+    def clear(self) -> None:
+        """Start with an empty pool."""
+        self.pool = jl.JointPool(self.law)
+        self._make_steps(np.zeros((0, 2)), np.zeros((0, len(MEASURES) + 2)))
 
-    def take(self, m: int) -> np.ndarray:
+    def _make_steps(self, F: np.ndarray, shown: np.ndarray) -> None:
+        """Arrays for all places of the pool, the first of them with this content."""
+        places = len(self.pool.batch)
+        d = np.zeros((places, 2))
+        all_F = np.zeros((places, 2))
+        all_shown = np.zeros((places, len(MEASURES) + 2))
+        all_F[: len(F)] = F
+        all_shown[: len(shown)] = shown
+        self.step = Step(d, all_F, None, shown=all_shown)
+        self.silent_step = Step(d, all_F, None)
+
+    def allocate(self, m: int) -> np.ndarray:
         """Places (m,) for new contacts."""
-        if m > len(self.free):
-            self.grow(len(self.batch) + m - len(self.free))
-        return np.array([self.free.pop() for _ in range(m)], int)
+        places = self.pool.allocate(m)
+        if len(self.pool.batch) > len(self.step.d):
+            self._make_steps(self.step.F, self.step.shown)
+        return places
 
-    def drop(self, places: np.ndarray) -> None:
-        """Forget the joints at these places."""
-        self.batch.reset(places)
+    def release(self, places: np.ndarray) -> None:
+        """Give back the places of contacts that have ended."""
+        self.pool.release(places)
         self.step.d[places] = 0.0
-        self.free = sorted([*self.free, *places.tolist()], reverse=True)
 
-    def begin(self, places: np.ndarray, mated: bool, bonded: bool) -> np.ndarray:
-        """Let joints start, as new; closure and sliding (2,) in m where they first touch."""
-        law = self.batch.law
-        start = np.zeros(2) if mated else law.unmated_start
-        self.batch.reset(places, mated)
+    def initialise(self, places: np.ndarray, mated: bool, bonded: bool) -> np.ndarray:
+        """Let joints start as new at their first touch.
+
+        mated: whether the two faces fit each other; bonded: whether bonds are intact. Returns the
+        displacement (2,) of the law at first touch: closure and sliding (m).
+        """
+        start = np.zeros(2) if mated else self.law.unmated_start
+        batch = self.pool.batch
+        batch.reset(places, mated)
         if not bonded:
-            self.batch.unbond(places)
-        damage = 0.0 if bonded and "damage" in law.tables.names else 1.0
-        shown = 0.0, 0.0, 1.0, 0.0, 0.0, damage, *start  # by SHOWN: it is separated, no more
-        self.step.F[places], self.step.shown[places] = 0.0, shown
+            batch.unbond(places)
+        is_intact = bonded and "damage" in self.law.tables.names
+        measures = dict.fromkeys(MEASURES, 0.0)
+        measures |= {"separated": 1.0, "damage": 0.0 if is_intact else 1.0}
+        self.step.F[places] = 0.0
+        self.step.shown[places] = [*measures.values(), *start]
         return start
 
-    def pool(self) -> Pool:
-        """What the compiled step knows of them."""
-        step, stress = self.step, self.curve["stress"]
-        arrays = step.d, step.F, step.shown, stress, self.curve["stiffness"]
-        return Pool(*map(address, arrays), len(stress), bool(opens_to(self.batch.law) > 0.0))
+    def restore(self, state: JointState) -> np.ndarray:
+        """Replace all joints by the joints of a snapshot; their places (n,)."""
+        self.clear()
+        places = self.allocate(len(state))
+        batch = self.pool.batch
+        batch.restore(state)
+        measures = batch.measures()[:4]
+        self.step.F[:] = batch.F
+        self.step.shown[:] = np.column_stack(
+            [*measures, batch.dissipated_energy, batch.damage, batch.delta]
+        )
+        return places
+
+    def arrays(self) -> LawJointArrays:
+        """Addresses of the arrays for the compiled step."""
+        stress = self.curve["stress"]
+        arrays = self.step.d, self.step.F, self.step.shown, stress, self.curve["stiffness"]
+        bears_tension = bool(opens_to(self.law) > 0.0)
+        return LawJointArrays(*map(address, arrays), len(stress), bears_tension)
 
 
 class Joints:
     """All joints of a scene; arrays run over the k contacts.
 
-    delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
-    (k,): shares of their shear capacity; stored, lost (k,) in J/m2; damage (k,) of their bonds, 1
-    where nothing holds tension. law, place (k,): number of the law, and place in its batch.
+    delta (k, 2) in m: closure and sliding since first touch; traction (k, 2) in Pa.
+    sliding, slipping, separated (k,): fractions of their shear capacity.
+    stored_energy, dissipated_energy (k,) in J/m2; damage (k,): of bonds, 1 without tension.
+    law, place (k,): number of the law, and place in its pool. by_law: the joints of each law.
 
-    The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
-    which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and
-    the work is that of the law: no energy is made.
+    A strength reduction by a factor F, `scene.reduction`, divides the shear stress of every joint
+    and multiplies the sliding at which it acts. Hence tan(friction angle), tan(dilation angle) and
+    cohesion are divided by F, while the work is the work of the law, so no energy is created.
 
-    Faces that meet in a run are unmated where the law fades. touch (k, 2): where its joint first
-    touches (closure and sliding in m, zeros for a mated one); delta counts from there.
+    Faces that meet in a run are unmated if the law has a finite mating length. first_touch (k, 2):
+    displacement of the law (closure and sliding, m) at which such a joint first touches, zero for a
+    mated one. edge_pairs (k, 2): the two edges whose faces meet.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.reduction = np.array([1.0, scene.reduction])
         self.law_names = [*scene.laws]
         self.by_law = [LawJoints(law, scene.reduction) for law in scene.laws.values()]
-        holds = [law if isinstance(law, jl.CoulombLaw) else law.bond for law in scene.laws.values()]
-        self.pulls = np.array([part.normal_stiffness if part else 0.0 for part in holds])  # Pa/m
-        self.touch, self.keys = np.zeros((0, 2)), np.zeros((0, 2), int)
+        # what bears tension: the joint of a Coulomb law, the bond of others
+        bonds = [law if isinstance(law, jl.CoulombLaw) else law.bond for law in scene.laws.values()]
+        self.tensile_stiffness = np.array(
+            [bond.normal_stiffness if bond else 0.0 for bond in bonds]
+        )
+        self.first_touch = np.zeros((0, 2))
+        self.edge_pairs = np.zeros((0, 2), int)
         self._arrange(np.zeros(0, int), np.zeros(0, int))
 
     def _arrange(self, law: np.ndarray, place: np.ndarray) -> None:
-        """Arrays for contacts with these laws, their joints at these places."""
-        self.law, self.place, self.n = law.astype(np.int64), place.astype(np.int64), len(law)
-        self.rows = [np.flatnonzero(law == i) for i in range(len(self.by_law))]
-        self.traction, self.delta = np.zeros((2, self.n, 2))
-        self.shares = np.zeros((SHOWN, self.n))
-        self.sliding, self.slipping, self.separated, self.stored_energy, self.lost, self.damage = (
-            self.shares
-        )
-        self._pools = (Pool * len(self.by_law))(*(held.pool() for held in self.by_law))
-        self.world = World(contacts=self.n)
-        self.bind(self.world)
-        self.world.call("read")
+        """Make the arrays for contacts (k,) with these laws, at these places of their pools."""
+        self.n = len(law)
+        self.law = law.astype(np.int64)
+        self.place = place.astype(np.int64)
+        self.rows_by_law = [np.flatnonzero(law == i) for i in range(len(self.by_law))]
+        self.traction = np.zeros((self.n, 2))
+        self.delta = np.zeros((self.n, 2))
+        self.measures = np.zeros((len(MEASURES), self.n))
+        (
+            self.sliding,
+            self.slipping,
+            self.separated,
+            self.stored_energy,
+            self.dissipated_energy,
+            self.damage,
+        ) = self.measures  # in the order of MEASURES
+        arrays = [joints.arrays() for joints in self.by_law]
+        self._law_arrays = (LawJointArrays * len(arrays))(*arrays)
+        self.step_arrays = StepArrays(n_contacts=self.n)
+        self.bind(self.step_arrays)
+        self.step_arrays.call("read_joints")
 
-    def bind(self, world: World) -> None:
-        """Tell the compiled step where these arrays lie."""
-        world.bind(self, "law", "place", "touch", "reduction", "traction", "delta", "shares",
-                   pools=self._pools)  # fmt: skip
+    def bind(self, arrays: StepArrays) -> None:
+        """Bind the arrays of the joints to those of a step."""
+        arrays.bind(
+            self, "law", "place", "first_touch", "reduction", "traction", "delta", "measures",
+            laws=self._law_arrays,
+        )  # fmt: skip
 
     def rearrange(
-        self, before: np.ndarray, law: np.ndarray, keys: np.ndarray, started: bool = False
+        self, old_row: np.ndarray, law: np.ndarray, edge_pairs: np.ndarray, started: bool = False
     ) -> None:
-        """Keep the joints of the contacts (k,) that were at the rows `before`; -1 is a new one.
+        """Follow a new list of contacts.
 
-        law (k,), keys (k, 2): of each its law and the edges that met. started: whether the run has
-        started. Then new ones have no bond, and are mated only where their two faces still touch in
-        a mated joint, which they then continue.
+        old_row (k,): row of each contact in the list before, -1 for a new one; law (k,);
+        edge_pairs (k, 2); started: whether the run has started. Before the start, new joints are
+        mated and bonded. In a run they have no bond, and are mated only where the same two faces
+        still touch in another mated joint, which they continue.
         """
-        new, gone = np.flatnonzero(before < 0), ~np.isin(np.arange(self.n), before)
-        place = np.append(self.place, -1)[before]  # -1, the last one, is that of what is new
-        touch = np.vstack([self.touch, [0.0, 0.0]])[before]
-        mates = self.keys[~self.touch.any(axis=1)] @ [1, 1j]  # two edges as one number
-        fits = np.isin(keys[new] @ [1, 1j], mates) | (not started)
-        for i, held in enumerate(self.by_law):
-            held.drop(self.place[gone & (self.law == i)])
-            mated = fits | (not held.batch.law.tables.fades)
-            for kind in (True, False):
-                rows = new[(law[new] == i) & (mated == kind)]
+        is_new = old_row < 0
+        new_rows = np.flatnonzero(is_new)
+        has_ended = ~np.isin(np.arange(self.n), old_row)
+        place = np.append(self.place, -1)[old_row]
+        first_touch = np.vstack([self.first_touch, [0.0, 0.0]])[old_row]
+        pair_as_number = [1, 1j]
+        mated_pairs = self.edge_pairs[~self.first_touch.any(axis=1)] @ pair_as_number
+        continues = np.isin(edge_pairs[new_rows] @ pair_as_number, mated_pairs) | (not started)
+        for i, joints in enumerate(self.by_law):
+            joints.release(self.place[has_ended & (self.law == i)])
+            is_mated = continues | (not joints.law.tables.fades)
+            for mated in (True, False):
+                rows = new_rows[(law[new_rows] == i) & (is_mated == mated)]
                 if len(rows):
-                    place[rows] = held.take(len(rows))
-                    touch[rows] = held.begin(place[rows], kind, bonded=not started)
-        self.touch, self.keys = touch, keys
+                    place[rows] = joints.allocate(len(rows))
+                    first_touch[rows] = joints.initialise(place[rows], mated, bonded=not started)
+        self.first_touch = first_touch
+        self.edge_pairs = edge_pairs
         self._arrange(law, place)
 
     def update(self, closure: np.ndarray, sliding: np.ndarray) -> None:
-        """Advance every joint to a closure (m), and by a sliding (m), in one step."""
+        """Advance all joints to a closure (k,) and by a sliding (k,), m, in one step of the law."""
         d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / self.reduction
-        for held, rows in zip(self.by_law, self.rows, strict=True):
-            held.step.d[self.place[rows]] = d[rows]
+        for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
+            joints.step.d[self.place[rows]] = d[rows]
         self.advance(1)
-        self.world.call("read")
+        self.step_arrays.call("read_joints")
 
-    def advance(self, parts: int) -> None:
-        """Advance the joints of all laws `parts` times by what their steps hold.
+    def advance(self, law_steps: int) -> None:
+        """Advance the joints of all laws `law_steps` times by the increments of their steps.
 
-        The law's friction work is first order in its step: more parts balance energy better.
+        The friction work of the law is first-order accurate in its step: more steps improve the
+        energy balance.
         """
-        for held, rows in zip(self.by_law, self.rows, strict=True):
+        for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
             if len(rows):
-                for step in [held.silent] * (parts - 1) + [held.step]:
-                    held.batch.take(step)
+                for step in [joints.silent_step] * (law_steps - 1) + [joints.step]:
+                    joints.pool.batch.take(step)
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Tractions (k, 2), tangents (k, 2, 2) and stored energies (k,) in J/m2 after increments d
-        (k, 2), leaving the state alone."""
-        F, C, by = np.empty((self.n, 2)), np.empty((self.n, 2, 2)), self.reduction
-        shown = np.empty((self.n, SHOWN + 2))
-        for held, rows in zip(self.by_law, self.rows, strict=True):
+        """Trial step by increments d (k, 2) in m; the state of the joints is unchanged.
+
+        Returns tractions (k, 2) in Pa, tangents (k, 2, 2) in Pa/m, stored energies (k,) in J/m2.
+        """
+        F = np.empty((self.n, 2))
+        C = np.empty((self.n, 2, 2))
+        stored_energy = np.empty(self.n)
+        for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
             m = len(rows)
-            step = Step(d[rows] / by, np.empty((m, 2)), np.empty((m, 2, 2)), self.place[rows],
-                        False, np.empty((m, SHOWN + 2)))  # fmt: skip
-            held.batch.take(step)
-            F[rows], C[rows], shown[rows] = step.F, step.C, step.shown
-        return F / by, C / np.outer(by, by), shown[:, 3]
+            step = Step(
+                d[rows] / self.reduction,
+                np.empty((m, 2)),
+                np.empty((m, 2, 2)),
+                where=self.place[rows],
+                keep=False,
+                shown=np.empty((m, len(MEASURES) + 2)),
+            )
+            joints.pool.batch.take(step)
+            F[rows] = step.F
+            C[rows] = step.C
+            stored_energy[rows] = step.shown[:, MEASURES.index("stored_energy")]
+        return F / self.reduction, C / np.outer(self.reduction, self.reduction), stored_energy
 
     def stick_predictor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As `trial` of virgin joints that cannot slide: tractions and tangents."""
-        closure, sign, shear = np.maximum(np.abs(d[:, 0]), 1e-9), np.sign(d[:, 0]), d[:, 1]
-        (stress, ss), above, below = (
-            np.array([self.virgin(of, "closure", closure * at) for of in ("stress", "stiffness")])
-            for at in (1.0, 1.01, 0.99)
-        )
-        rises, stiffens = (above - below) / (0.02 * closure)
-        pulls = self.pulls[self.law] * (self.damage < 1)  # what is open bears nothing, a bond does
-        normal, rises = np.where(d[:, 0] <= 0, [pulls * d[:, 0], pulls], [stress, rises])
-        C = np.stack([rises, 0.0 * rises, stiffens * sign * shear, ss], axis=1)
-        return np.stack([normal, ss * shear], axis=1), C.reshape(-1, 2, 2)
+        """Tractions (k, 2) and tangents (k, 2, 2) of virgin joints that stick, at d (k, 2) in m.
 
-    def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
-        """A column of the virgin curves, such as "stress", where another one is x (k,)."""
+        The shear stiffness is the stiffness bound of the first-loading curve at the closure.
+        """
+        size = np.maximum(np.abs(d[:, 0]), MIN_CLOSURE)
+        sign = np.sign(d[:, 0])
+        sliding = d[:, 1]
+        stress, shear_stiffness = self._stress_and_stiffness(size)
+        above = self._stress_and_stiffness(size * 1.01)
+        below = self._stress_and_stiffness(size * 0.99)
+        normal_stiffness, stiffening = (above - below) / (0.02 * size)
+        # an open joint bears nothing, except for a bond
+        pulling = self.tensile_stiffness[self.law] * (self.damage < 1)
+        is_open = d[:, 0] <= 0
+        normal = np.where(is_open, pulling * d[:, 0], stress)
+        normal_stiffness = np.where(is_open, pulling, normal_stiffness)
+        C = np.stack(
+            [
+                normal_stiffness,
+                0.0 * normal_stiffness,
+                stiffening * sign * sliding,
+                shear_stiffness,
+            ],
+            axis=1,
+        )
+        return np.stack([normal, shear_stiffness * sliding], axis=1), C.reshape(-1, 2, 2)
+
+    def _stress_and_stiffness(self, closure: np.ndarray) -> np.ndarray:
+        """Normal stress (Pa) and stiffness bound (Pa/m) at first loading, (2, k)."""
+        return np.array(
+            [self.interpolate(column, "closure", closure) for column in ("stress", "stiffness")]
+        )
+
+    def interpolate(self, column: str, by: str, x: np.ndarray) -> np.ndarray:
+        """A column of the first-loading curves, such as "stress", where column `by` is x (k,)."""
         out = np.empty(self.n)
-        for held, rows in zip(self.by_law, self.rows, strict=True):
-            out[rows] = np.interp(x[rows], held.curve[by], held.curve[of])
+        for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
+            out[rows] = np.interp(x[rows], joints.curve[by], joints.curve[column])
         return out
 
     @property
     def stiffness(self) -> np.ndarray:
-        """Upper bound (k,) of the stiffness at the normal stress of now (Pa/m)."""
+        """Upper bound (k,) of the stiffness at the present normal stress (Pa/m)."""
         stress = self.traction[:, 0]
-        return self.virgin("stiffness", "stress", stress) * ((stress > 0) | (self.damage < 1))
+        bears_load = (stress > 0) | (self.damage < 1)
+        return self.interpolate("stiffness", "stress", stress) * bears_load
 
-    def renew(self, rows: np.ndarray, work: np.ndarray, most: np.ndarray) -> np.ndarray:
-        """Let the joints of rows (m,) start anew, mated or not as they were, without a bond.
+    def restart(self, rows: np.ndarray, energy: np.ndarray, max_closure: np.ndarray) -> np.ndarray:
+        """Let the joints of rows (m,) start as new, mated or not as before, without a bond.
 
-        Returns closure (m) and stored energy (J/m2) (2, m) to start with: those at which they hold
-        `work` (m,), or at which they are closed by `most` (m,) if that is less.
+        energy (m,) in J/m2: stored energy to start with; max_closure (m,) in m: limit of the
+        closure. Returns closure (m) and stored energy (J/m2) to start with, (2, m): the closure
+        that stores `energy`, or `max_closure` if that is smaller.
         """
-        out, mated = np.empty((2, len(rows))), ~self.touch[rows].any(axis=1)
-        for i, held in enumerate(self.by_law):
-            for kind in (True, False):
-                mine = (self.law[rows] == i) & (mated == kind)
+        out = np.empty((2, len(rows)))
+        is_mated = ~self.first_touch[rows].any(axis=1)
+        for i, joints in enumerate(self.by_law):
+            for mated in (True, False):
+                mine = (self.law[rows] == i) & (is_mated == mated)
                 if mine.any():
-                    curve = held.curve if kind else tabulate_unmated_loading(held.batch.law)
-                    anew = np.interp(work[mine], curve["work"], curve["closure"])
-                    anew = np.minimum(anew, most[mine])
-                    out[:, mine] = anew, np.interp(anew, curve["closure"], curve["work"])
-                    held.begin(self.place[rows[mine]], kind, bonded=False)
-        self.world.call("read")
+                    curve = joints.curve if mated else tabulate_unmated_loading(joints.law)
+                    closure = np.interp(energy[mine], curve["work"], curve["closure"])
+                    closure = np.minimum(closure, max_closure[mine])
+                    out[:, mine] = closure, np.interp(closure, curve["closure"], curve["work"])
+                    joints.initialise(self.place[rows[mine]], mated, bonded=False)
+        self.step_arrays.call("read_joints")
         return out
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """A copy of all state; the laws are numbered, their names may be no names of arrays."""
-        arrays = {"touch": self.touch.copy()}
-        for i, (held, rows) in enumerate(zip(self.by_law, self.rows, strict=True)):
-            state = held.batch.snapshot(self.place[rows])
-            fingerprint = np.array(state.fingerprint)
-            arrays |= {f"states-{i}": state.values.T, f"fingerprint-{i}": fingerprint}
+        """A copy of all state, by names of arrays. Laws are numbered in them."""
+        arrays = {"first_touch": self.first_touch.copy()}
+        for i, (joints, rows) in enumerate(zip(self.by_law, self.rows_by_law, strict=True)):
+            state = joints.pool.batch.snapshot(self.place[rows])
+            arrays[f"states-{i}"] = state.values.T
+            arrays[f"fingerprint-{i}"] = np.array(state.fingerprint)
         return arrays
 
-    def restore(self, state: dict[str, np.ndarray], law: np.ndarray, keys: np.ndarray) -> None:
-        """Back to a snapshot, of contacts with these laws and keys. Raises ValueError for
-        another's."""
-        place, touch = np.zeros(len(law), int), state["touch"]
-        for i, held in enumerate(self.by_law):
+    def restore(
+        self, state: dict[str, np.ndarray], law: np.ndarray, edge_pairs: np.ndarray
+    ) -> None:
+        """Return to a snapshot of contacts with these laws (k,) and edges (k, 2).
+
+        Raises ValueError for a snapshot of other contacts or laws.
+        """
+        place = np.zeros(len(law), int)
+        first_touch = state["first_touch"]
+        for i, joints in enumerate(self.by_law):
             rows = np.flatnonzero(law == i)
-            values, fingerprint = (state[f"{part}-{i}"] for part in PARTS)
-            if len(values.T) != len(rows) or len(touch) != len(law):
+            values, fingerprint = (state[f"{part}-{i}"] for part in STATE_PARTS)
+            if len(values.T) != len(rows) or len(first_touch) != len(law):
                 raise ValueError(
                     "the state's joints are not those of the scene's laws and contacts"
                 )
-            held.grow(len(rows))
-            held.batch.restore(JointState(str(fingerprint), values.T))
-            held.free, place[rows] = [], np.arange(len(rows))
-            held.step.F[:] = held.batch.F
-            shares = *held.batch.measures()[:4], held.batch.dissipated_energy, held.batch.damage
-            held.step.shown[:] = np.column_stack([*shares, held.batch.delta])
-        self.touch, self.keys = touch.copy(), keys
+            place[rows] = joints.restore(JointState(str(fingerprint), values.T))
+        self.first_touch = first_touch.copy()
+        self.edge_pairs = edge_pairs
         self._arrange(law, place)

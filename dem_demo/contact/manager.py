@@ -1,196 +1,261 @@
-"""The contacts within reach: which corners are over which edges, and the identity of each.
+"""The contact manager: which corners are on which edges, and the identity of contacts in time.
 
-The range of a corner along an edge ends where what comes next is as deep: another corner that
-takes over, or the next edge. So of the corners of two blocks that overlap the least deep are found.
+A joint remembers its history, so a contact must keep its joint for as long as two faces stay
+together, and must never get the history of another one. Three ideas make this work.
 
-A contact begins when a corner comes within reach of an edge. It keeps its joint while the corner
-slides along the edge, turns on it from one side of the block to the next, or trades roles with
-another corner at the end of an edge. New contacts are looked for only next to blocks that have
-moved far enough to matter; between such renewals the geometry is plain arrays.
+Range. A corner may lie over the lines of several edges, and several corners of a block over the
+same edge. A contact is kept only where its corner is within its range on the edge. The range ends
+where the neighbour, the next corner or the next edge, is equally deep. So exactly one contact
+remains at each place, and blocks that overlap have a contact at the corner that is least deep.
+
+Transfer. Contacts are not found anew in each step. When a corner leaves its range, the contact goes
+on to the corner or edge that comes next, and takes its joint with it: while a corner slides over an
+edge, while a block rolls from one side to the next, while two corners swap roles at the end of an
+edge. The depth is continuous there, and so is the closure. The length may jump;
+`Simulation._transfer_joints` keeps the energy balance then. Corners return to a range only beyond a
+small tolerance, so that rounding does not make them chatter.
+
+Rebuild. New contacts appear only between blocks that have moved. As in a Verlet neighbour list,
+each block has a skin: pairs are candidates from a gap of one skin, and their contacts are searched
+again only when a block has moved by a fraction of it (`MAX_SKIN_UNTIL_REBUILD`), or when a transfer
+shows that another contact may begin beside it (`needs_rebuild`). Between two rebuilds the geometry
+is plain arrays. A corner becomes a contact from a gap of a skin, and is dropped beyond 1.5 skins: a
+contact that opens and closes keeps its joint.
+
+A rebuild raises an error rather than to miss a contact: where two blocks overlap and no corner in
+its range sees half of the overlap.
 """
 
 import numpy as np
 
 from ..compiled import address
+from ..native.layout import CONSTANTS
 from ..scene import Scene, SceneError
 from .geometry import Contacts, Outlines
 
-TILT = np.sin(np.radians(6.5))  # how far a side of a corner may dip below the edge
-CARRIED = 0.5  # share of an overlap that some joint must see
-ROUNDING = 1e-10  # m: corners stay until their depth is wrong by this, so that none chatters
-STALE = 0.25  # share of its skin that a block may move until its contacts are looked for
-SEEN = 0.001  # of its skin: who has moved less keeps its contacts when others are looked for
+RANGE_TOLERANCE = CONSTANTS["RANGE_TOLERANCE"].value
+MAX_DIP_SINE = np.sin(np.radians(6.5))  # tilt by which a side of a corner may dip below the edge
+MIN_SEEN_FRACTION = 0.5  # of an overlap of two blocks, that the deepest contact must see
+MIN_CHECKED_OVERLAP = 0.25  # fraction of the skin: smaller overlaps are not checked
+MAX_SKIN_UNTIL_REBUILD = 0.25  # fraction of its skin that a block may move until a rebuild
+MOVED_FRACTION = 0.001  # of its skin: blocks that moved less are left out of a rebuild
+DROP_GAP = 1.5  # skins: gap beyond which a contact is dropped
+CAPACITY = 64  # candidates that there is room for at first
 
 
-def _in_range(contacts: Contacts, known: np.ndarray) -> np.ndarray:
-    """Which corners are in the range of their edge; known (k,): was it there before?
+def _in_range(contacts: Contacts, is_known: np.ndarray) -> np.ndarray:
+    """Whether each corner is in its range on its edge, (k,).
 
-    Of two corners at the limit between them only one is meant: the one that was there.
+    is_known (k,): whether the contact exists already. Of two corners at the limit between them one
+    is chosen, the known one.
     """
-    ok = (contacts.rise > -TILT).all(axis=0) & (contacts.inside >= -ROUNDING).all(axis=0)
-    here = np.flatnonzero(ok & (contacts.inside.min(axis=0) <= ROUNDING))
-    at_limit = dict(zip(contacts.codes[here].tolist(), here.tolist(), strict=True))
-    first, meant = here[np.argsort(~known[here], kind="stable")], ok.tolist()
-    for i, beyond in zip(first.tolist(), contacts.following()[first].tolist(), strict=True):
-        if beyond in at_limit:
-            meant[at_limit[beyond]] &= not meant[i]
-    return np.array(meant, bool)
+    is_raised = (contacts.tilt_sine > -MAX_DIP_SINE).all(axis=0)
+    margin = contacts.range_margin.min(axis=0)
+    in_range = is_raised & (margin >= -RANGE_TOLERANCE)
+    at_limit = np.flatnonzero(in_range & (margin <= RANGE_TOLERANCE))
+    row_of_code = dict(zip(contacts.codes[at_limit].tolist(), at_limit.tolist(), strict=True))
+    known_first = at_limit[np.argsort(~is_known[at_limit], kind="stable")]
+    next_codes = contacts.next_codes()[known_first]
+    chosen = in_range.tolist()
+    for row, next_code in zip(known_first.tolist(), next_codes.tolist(), strict=True):
+        if next_code in row_of_code:
+            chosen[row_of_code[next_code]] &= not chosen[row]
+    return np.array(chosen, bool)
 
 
 class ContactManager:
-    """Follows the contacts of a scene.
+    """The contacts of a scene, k at present.
 
-    contacts: at the motion followed to, on corner and edge (k,); keys (k, 2): edges that met when
-    found; law (k,): number of the law between these; offset (k,): closure offset (m): above zero
-    the depth that a contact had to give up (see `Simulation._transfer`), until it opens; below zero
-    less the closure from the stress of before, for life; renewed_at (3, blocks): motion when the
-    contacts of each block were last looked for; urgent (blocks,): must be looked for, wherever the
-    block is.
-    skins (blocks,): pymunk reports pairs within the sum of their skins; a corner counts from a gap
-    of the mean and is forgotten beyond 1.5 of it (m).
+    contacts: at the motion of the last update, on corner and edge (k,). edge_pairs (k, 2): edges
+    whose faces met when the contact was found. law (k,): number of the law between these.
+    closure_offset (k,): depth at zero closure (m). Above zero it is a depth that the contact had to
+    give up (`Simulation._transfer_joints`), until it opens; below zero it is minus the closure
+    under in-situ stress, for good. rebuilt_at (3, blocks): motion at which the contacts of each
+    block were last searched. needs_rebuild (blocks,): contacts must be searched wherever the block
+    is. skins (blocks,) in m: pymunk reports pairs within the sum of their skins; a contact begins
+    at a gap of their mean.
     """
 
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
         self.blocks = blocks = scene.blocks
         self.skins = scene.skins
         self.outlines = Outlines(blocks, scene.run.corner_length, scene.run.soft)
-        self.deepest = scene.run.max_overlap * np.array([block.width for block in blocks])
-        self.reach = np.array([block.reach for block in blocks])
-        self.fixed = np.array([block.fixed for block in blocks])
+        self.max_overlap = scene.run.max_overlap * np.array([block.width for block in blocks])
+        self.radius = np.array([block.reach for block in blocks])
+        self.is_fixed = np.array([block.fixed for block in blocks])
+        self._read_laws(scene)
+        self.law = np.zeros(0, int)
+        self.edge_pairs = np.zeros((0, 2), int)
+        self.closure_offset = np.zeros(0)
+        self.needs_rebuild = np.zeros(len(blocks), bool)
+        self.rebuilt_at = np.full((3, len(blocks)), np.nan)  # never
+        no_rows = np.zeros(0, int)
+        self.contacts = Contacts(self.outlines, no_rows, no_rows, motion)
+
+    def _read_laws(self, scene: Scene) -> None:
+        """Numbers of the laws: default, of edges, and of [[joint]] tables in rising priority."""
         number = {name: i for i, name in enumerate(scene.laws)}
-        self._default, start = number[scene.default_law], self.outlines.start
-        self._of_edge = np.full(start[-1], -1)
+        self._default_law = number[scene.default_law]
+        self._law_of_edge = np.full(self.outlines.first_corner[-1], -1)
         for (block, edge), law in scene.edge_laws.items():
-            self._of_edge[start[block] + edge] = number[law]
-        # for the second block of a contact, for its first, and for both: later ones overrule
-        self._of_blocks = [
-            (sides, sorted(meant), number[law])
-            for sides in ([1], [0], [0, 1])
-            for meant, law in scene.pairs.items()
-            if len(meant) == len(sides)
+            self._law_of_edge[self.outlines.first_corner[block] + edge] = number[law]
+        second_block, first_block, both_blocks = [1], [0], [0, 1]
+        self._laws_of_blocks = [
+            (sides, sorted(named), number[law])
+            for sides in (second_block, first_block, both_blocks)
+            for named, law in scene.pairs.items()
+            if len(named) == len(sides)
         ]
-        none = np.zeros(0, int)
-        self.law, self.keys, self.offset = none, none.reshape(0, 2), np.zeros(0)
-        self.urgent = np.zeros(len(blocks), bool)
-        self.renewed_at = np.full((3, len(blocks)), np.nan)  # never
-        self.contacts = Contacts(self.outlines, none, none, motion)
 
     @property
     def closure(self) -> np.ndarray:
-        """Closure (k,) that the joints see: the depth less the closure offset."""
-        counts = (self.contacts.closure > 0) | (self.offset < 0)
-        return self.contacts.closure - np.where(counts, self.offset, 0.0)
+        """Closure (k,) of the joints: depth less closure offset (m)."""
+        has_offset = (self.contacts.closure > 0) | (self.closure_offset < 0)
+        return self.contacts.closure - np.where(has_offset, self.closure_offset, 0.0)
 
-    def follow(self, motion: np.ndarray) -> None:
-        """Bring the contacts to a motion (6, n), each to the corner and edge where it is by then.
+    def update(self, motion: np.ndarray) -> None:
+        """Update the contacts to a motion (6, blocks).
 
         Corners that have left the range of their edge go on to what is next there.
         """
-        self.contacts.world.bind(motion=motion, urgent=self.urgent)
-        self.contacts.world.call("follow")
+        arrays = self.contacts.step_arrays
+        arrays.bind(motion=motion, needs_rebuild=self.needs_rebuild)
+        arrays.call("update_contacts")
 
-    def renew(self, motion: np.ndarray, near: np.ndarray, pressed: bool = True) -> np.ndarray:
-        """Look again at the pairs (p, 2) of near blocks of which one has moved.
+    def rebuild(
+        self, motion: np.ndarray, candidates: np.ndarray, keep_closure: bool = True
+    ) -> np.ndarray:
+        """Rebuild the list of contacts, next to blocks that have moved.
 
-        Of new contacts that are pressed already, the closure counts (`pressed`, at the start of a
-        run) or becomes their closure offset, so that they make no energy. Returns for each contact
-        its place (k,) in the list before, -1 for a new one.
+        motion: (6, blocks); candidates (p, 2): pairs of neighbouring blocks; keep_closure: whether
+        a new contact that overlaps already is closed by its depth, as at the start of a run.
+        Otherwise the depth becomes its closure offset, so that it brings no energy.
+
+        Returns the row (k,) of each contact in the list before, -1 for a new one.
         """
-        x, y, turned = motion[:3] - self.renewed_at
-        moved = np.hypot(x, y) + np.abs(turned) * self.reach
-        which = self.urgent | ~(moved <= SEEN * self.skins)
-        self.renewed_at[:, which], self.urgent[:] = motion[:3, which], False
-        pairs = near[which[near].any(axis=1) & ~self.fixed[near].all(axis=1)]
-        now, k = self.contacts, len(self.law)
-        asked = np.flatnonzero(which[now.a] | which[now.b])
-        found, keys = self._found(motion, pairs, now.codes[asked])
-        _, again, place = np.intersect1d(found.codes, now.codes[asked], return_indices=True)
-        old = np.full(len(keys), -1)
-        old[again] = asked[place]
-        law = self.laws_of(keys)
-        stays = (old >= 0) & ((found.closure > 0) | (np.append(self.law, -1)[old] == law))
-        fresh = ~stays & (found.closure > -self._skin(found.a, found.b))
-        gone = np.setdiff1d(asked, old[stays], assume_unique=True)
-        rows = np.setdiff1d(np.arange(k), gone, assume_unique=True)
-        if len(rows) == k and not fresh.any():
+        has_moved = self._blocks_to_rebuild(motion)
+        pairs = candidates[has_moved[candidates].any(axis=1)]
+        pairs = pairs[~self.is_fixed[pairs].all(axis=1)]
+        present = self.contacts
+        searched = np.flatnonzero(has_moved[present.block_a] | has_moved[present.block_b])
+        found, edge_pairs = self._find(motion, pairs, present.codes[searched])
+        old_row = _match(found.codes, present.codes[searched], searched)
+        law = self.laws_of(edge_pairs)
+        same_law = np.append(self.law, -1)[old_row] == law
+        stays = (old_row >= 0) & ((found.closure > 0) | same_law)
+        is_new = ~stays & (found.closure > -self._skin(found.block_a, found.block_b))
+        dropped = np.setdiff1d(searched, old_row[stays], assume_unique=True)
+        rows = np.setdiff1d(np.arange(len(self.law)), dropped, assume_unique=True)
+        if len(rows) == len(self.law) and not is_new.any():
             return rows
-        lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)
-        self.keys = np.concatenate([self.keys[rows], keys[fresh]])
-        self.law = np.concatenate([self.law[rows], law[fresh]])
-        self.offset = np.concatenate([self.offset[rows], lost])
-        corner = np.concatenate([now.corner[rows], found.corner[fresh]])
-        edge = np.concatenate([now.edge[rows], found.edge[fresh]])
+        depth = np.maximum(found.closure[is_new], 0.0)
+        offset = 0.0 * depth if keep_closure else depth
+        self.edge_pairs = np.concatenate([self.edge_pairs[rows], edge_pairs[is_new]])
+        self.law = np.concatenate([self.law[rows], law[is_new]])
+        self.closure_offset = np.concatenate([self.closure_offset[rows], offset])
+        corner = np.concatenate([present.corner[rows], found.corner[is_new]])
+        edge = np.concatenate([present.edge[rows], found.edge[is_new]])
         self.contacts = Contacts(self.outlines, corner, edge, motion)
-        return np.concatenate([rows, np.full(len(lost), -1)])
+        return np.concatenate([rows, np.full(len(offset), -1)])
+
+    def _blocks_to_rebuild(self, motion: np.ndarray) -> np.ndarray:
+        """Mask (blocks,) of blocks that have moved since their last rebuild, which is now."""
+        x, y, rotation = motion[:3] - self.rebuilt_at
+        distance = np.hypot(x, y) + np.abs(rotation) * self.radius
+        has_rested = distance <= MOVED_FRACTION * self.skins  # false before the first rebuild
+        has_moved = self.needs_rebuild | ~has_rested
+        self.rebuilt_at[:, has_moved] = motion[:3, has_moved]
+        self.needs_rebuild[:] = False
+        return has_moved
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""
-        return (self.contacts.a == min(one, other)) & (self.contacts.b == max(one, other))
+        contacts = self.contacts
+        return (contacts.block_a == min(one, other)) & (contacts.block_b == max(one, other))
 
     def _skin(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Mean skin (m) of two blocks."""
         return 0.5 * (self.skins[a] + self.skins[b])
 
-    def laws_of(self, edges: np.ndarray) -> np.ndarray:
-        """Number (k,) of the law of edges (k, 2) that meet, in the order of their blocks.
+    def laws_of(self, edge_pairs: np.ndarray) -> np.ndarray:
+        """Number (k,) of the law between two edges (k, 2) that meet, in the order of their blocks.
 
-        The law of a [[joint]] table if one names both blocks, or one of them (that of the block
-        that comes first in the scene, if both have one); else that of the joint set that cut both
-        edges; else the scene's.
+        In this order: the law of a [[joint]] table that names both blocks; of one that names one of
+        them, the block that comes first in the scene if both have one; the law of the joint set
+        that cut both edges; the default of the scene.
         """
-        one, other = self._of_edge[edges].T
-        out = np.where((one == other) & (one >= 0), one, self._default)
-        blocks = self.outlines.block[edges]
-        for sides, meant, law in self._of_blocks:
-            out[(blocks[:, sides] == meant).all(axis=1)] = law
-        return out
+        one, other = self._law_of_edge[edge_pairs].T
+        law = np.where((one == other) & (one >= 0), one, self._default_law)
+        blocks = self.outlines.block[edge_pairs]
+        for sides, named, law_number in self._laws_of_blocks:
+            law[(blocks[:, sides] == named).all(axis=1)] = law_number
+        return law
 
-    def _found(
-        self, motion: np.ndarray, pairs: np.ndarray, known: np.ndarray
+    def _find(
+        self, motion: np.ndarray, pairs: np.ndarray, known_codes: np.ndarray
     ) -> tuple[Contacts, np.ndarray]:
-        """The contacts between pairs (p, 2) of blocks and the edges (k, 2) that meet there; where
-        two are equal, that of a code in `known` is meant.
+        """Contacts between pairs (p, 2) of blocks, and the edges (k, 2) that meet there.
 
-        Raises SceneError for an overlap that is too deep, or that no corner sees.
+        known_codes: of existing contacts, which are preferred where two are equivalent. Raises
+        SceneError for an overlap that is too deep, or that no corner sees.
         """
-        n = len(pairs)
-        limit, skin = self.deepest[pairs].min(axis=1), self._skin(*pairs.T)
-        near, deepest = 1.5 * skin, 1.5 * limit
-        apart, room, most = np.empty((2, n)), 0, 64
-        world = self.outlines.world(motion)
-        pairs, start = np.ascontiguousarray(pairs, np.int64), self.outlines.start
-        given = [address(array) for array in (pairs, start, near, deepest)]
-        while most > room:  # again where there was no room for all
-            room = most
-            out = np.empty((3, room), np.int64)
-            most = world.call("find", n, *given, room, *map(address, out), address(apart))
-        corner, edge, pair = out[:, :most]
-        every = Contacts(self.outlines, corner, edge, motion)
-        ok = _in_range(every, np.isin(every.codes, known))
-        seen = np.full(2 * n, -np.inf)
-        np.maximum.at(seen, pair[ok], every.closure[ok])
-        self._require_carried(pairs, -apart.max(axis=0), seen.reshape(2, n).max(axis=0), limit)
-        found = Contacts(self.outlines, corner[ok], edge[ok], motion)
-        return found, found.edges
+        p = len(pairs)
+        pairs = np.ascontiguousarray(pairs, np.int64)
+        limit = self.max_overlap[pairs].min(axis=1)
+        max_gap = DROP_GAP * self._skin(*pairs.T)
+        max_depth = 1.5 * limit
+        separation = np.empty((2, p))
+        arrays = self.outlines.step_arrays(motion)
+        inputs = [address(a) for a in (pairs, self.outlines.first_corner, max_gap, max_depth)]
+        capacity = 0
+        n_candidates = CAPACITY
+        while n_candidates > capacity:  # again where there was no room for all
+            capacity = n_candidates
+            out = np.empty((3, capacity), np.int64)
+            outputs = [address(a) for a in (*out, separation)]
+            n_candidates = arrays.call("find_candidates", p, *inputs, capacity, *outputs)
+        corner, edge, pair = out[:, :n_candidates]
+        candidates = Contacts(self.outlines, corner, edge, motion)
+        in_range = _in_range(candidates, np.isin(candidates.codes, known_codes))
+        deepest_seen = np.full(2 * p, -np.inf)
+        np.maximum.at(deepest_seen, pair[in_range], candidates.closure[in_range])
+        overlap = -separation.max(axis=0)
+        self._require_seen(pairs, overlap, deepest_seen.reshape(2, p).max(axis=0), limit)
+        found = Contacts(self.outlines, corner[in_range], edge[in_range], motion)
+        return found, found.edge_pairs
 
-    def _require_carried(self, pairs, true, seen, limit) -> None:
-        if (true > limit).any():
-            i = int((true - limit).argmax())
-            self.refuse(pairs[i], true[i])
-        lost = (true > 0.25 * self._skin(*pairs.T)) & (seen < CARRIED * true)
-        if lost.any():
-            p = int(lost.argmax())
+    def _require_seen(
+        self, pairs: np.ndarray, overlap: np.ndarray, seen: np.ndarray, limit: np.ndarray
+    ) -> None:
+        """Refuse overlaps (p,) in m of pairs of blocks beyond a limit (p,), and overlaps of which
+        the contacts see too little: `seen` (p,), the depth of the deepest one."""
+        if (overlap > limit).any():
+            i = int((overlap - limit).argmax())
+            self.refuse_overlap(pairs[i], overlap[i])
+        is_checked = overlap > MIN_CHECKED_OVERLAP * self._skin(*pairs.T)
+        is_missed = is_checked & (seen < MIN_SEEN_FRACTION * overlap)
+        if is_missed.any():
+            p = int(is_missed.argmax())
             one, other = (self.blocks[n].name for n in pairs[p])
             raise SceneError(
-                f"blocks {one!r} and {other!r} overlap by {true[p]:.3g} m where no corner is over "
-                "an edge that faces it: start the blocks apart, or resume with a smaller step"
+                f"blocks {one!r} and {other!r} overlap by {overlap[p]:.3g} m where no corner is "
+                "over an edge that faces it: start the blocks apart, or resume with a smaller step"
             )
 
-    def refuse(self, pair, depth: float) -> None:
-        """Refuse an overlap (m) of two blocks beyond run.max_overlap."""
+    def refuse_overlap(self, pair, depth: float) -> None:
+        """Raise SceneError for an overlap (m) of two blocks beyond run.max_overlap."""
         one, other = (self.blocks[n].name for n in pair)
         raise SceneError(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below "
-            f"{self.deepest[list(pair)].min():.3g} m (a share of the smaller block's width); "
+            f"{self.max_overlap[list(pair)].min():.3g} m (a share of the smaller block's width); "
             "draw them apart, resume with a smaller step, or use stiffer joints, lower loads or "
             "speeds, a larger run.corner_length or run.max_overlap"
         )
+
+
+def _match(codes: np.ndarray, known_codes: np.ndarray, known_rows: np.ndarray) -> np.ndarray:
+    """Row (k,) of the known contact with the same code, -1 where there is none."""
+    rows = np.full(len(codes), -1)
+    _, here, there = np.intersect1d(codes, known_codes, return_indices=True)
+    rows[here] = known_rows[there]
+    return rows

@@ -1,9 +1,9 @@
-"""The blocks in motion, and the loads on their edges.
+"""Blocks in motion, and the loads on their edges.
 
-pymunk holds their shapes and finds pairs that are near, all of it here. Shapes are sensors with a
-skin, so pymunk reports which blocks come near each other and never moves them: the compiled step
-does, by symplectic Euler (positions with the velocities that they have, then velocities with the
-forces at the new positions).
+pymunk holds the shapes of the blocks and does the broad-phase contact detection. Its shapes are
+sensors with a skin: pymunk reports which blocks come near each other, and never moves them. The
+compiled step moves them by symplectic Euler: positions by the present velocities, then velocities
+by the forces at the new positions.
 """
 
 import numpy as np
@@ -12,140 +12,172 @@ import pymunk
 from ..contact import ContactManager, Contacts, Outlines
 from ..scene import Drives, Scene, SceneError, Stress
 
-MOVED = 0.25  # most of its skin that a block may move in a step: else contacts could be missed
+MAX_SKIN_PER_STEP = 0.25  # fraction of its skin that a block may move in a step: no contact missed
+BROAD_PHASE_STEP = 1e-9  # s: pymunk detects pairs in a step; with no velocity nothing moves
 
 
 class Blocks:
-    """The blocks of a scene; arrays (n, 3) run over blocks and motions x, y, turn.
+    """The blocks of a scene; arrays (n, 3) run over blocks and the motions x, y, rotation.
 
-    motion (6, n): positions, angles, and the velocities that led there; velocity (3, n): those to
-    go on with. inertia: mass, mass, moment; mobile (n, 1): blocks that move, driven rock too;
-    free: motions that forces move; gravity, steady: forces that do not change (N); loads: these
-    without gravity, with pressures on edges (`apply_loads`); root: 1/sqrt(inertia) of the free
-    motions, else 0; lightness (n,): 1/kg, of what can give way; gone (n,): blocks that were taken
-    away; support (n, 3): what is left of what these bore on the others (N). The compiled step
-    writes to the first two: change them in place.
+    motion (6, n): positions, angles, and the velocities that led there; velocity (3, n): velocities
+    of the next step. The compiled step writes both in place. inertia (n, 3): mass, mass, moment of
+    inertia; inverse_sqrt_inertia (n, 3): of free motions, else 0; inverse_mass (n,) in 1/kg: of
+    blocks that forces move, else 0. is_mobile (n, 1): blocks that move, also fixed rock that a
+    drive moves; is_free (n, 3): motions that forces move; is_removed (n,): excavated blocks.
+    gravity, steady_loads (n, 3): constant forces (N); loads (n, 3): steady loads, pressures on
+    edges and support (`apply_loads`); support (n, 3): the remaining part of the forces that removed
+    blocks exerted on the others (N).
     """
 
     def __init__(self, scene: Scene) -> None:
         blocks = scene.blocks
-        self.names, self.skins = [block.name for block in blocks], scene.skins
+        n = len(blocks)
+        self.names = [block.name for block in blocks]
+        self.skins = scene.skins
+        self.radius = np.array([block.reach for block in blocks])
         sections = [block.section for block in blocks]
         self.inertia = scene.thickness * np.array([[s.mass, s.mass, s.moment] for s in sections])
-        self.mobile = np.array([[block.moves] for block in blocks])
         self.drives = Drives(scene.drives)
-        self.free = self.mobile.repeat(3, axis=1)
-        self.free[self.drives.rows, self.drives.axes] = False
-        self.root = np.where(self.free, 1 / np.sqrt(self.inertia), 0.0)
-        self.gravity = self.mobile * self.inertia * [*scene.gravity, 0.0]
-        self.steady = np.array([[*block.load, 0.0] for block in blocks]) * self.mobile
-        self.loads = self.steady.copy()
-        self.reach = np.array([block.reach for block in blocks])
-        self.lightness = self.free[:, :2].any(axis=1) / self.inertia[:, 0]
-        places = np.array([[*block.centroid, 0.0] for block in blocks]).T
-        start = np.array([[*block.velocity, block.spin] for block in blocks])
-        self.velocity = np.ascontiguousarray((start * self.mobile).T)
-        self.motion = np.concatenate([places, self.velocity])
-        self._near: set[tuple[int, ...]] = set()
-        self._build(scene)
-        self.gone, self.support = np.zeros(len(blocks), bool), np.zeros((len(blocks), 3))
+        self.is_mobile = np.array([[block.moves] for block in blocks])
+        self.is_free = self.is_mobile.repeat(3, axis=1)
+        self.is_free[self.drives.rows, self.drives.axes] = False
+        self.is_removed = np.zeros(n, bool)
+        self.inverse_sqrt_inertia = np.where(self.is_free, 1 / np.sqrt(self.inertia), 0.0)
+        self.inverse_mass = self.is_free[:, :2].any(axis=1) / self.inertia[:, 0]
+        self.gravity = self.is_mobile * self.inertia * [*scene.gravity, 0.0]
+        self.steady_loads = np.array([[*block.load, 0.0] for block in blocks]) * self.is_mobile
+        self.loads = self.steady_loads.copy()
+        self.support = np.zeros((n, 3))
+        position = np.array([[*block.centroid, 0.0] for block in blocks]).T
+        start_velocity = np.array([[*block.velocity, block.spin] for block in blocks])
+        self.velocity = np.ascontiguousarray((start_velocity * self.is_mobile).T)
+        self.motion = np.concatenate([position, self.velocity])
+        self._neighbours: set[tuple[int, ...]] = set()
+        self._build_broad_phase(scene)
         self.remove(list(scene.removed))
 
-    def _build(self, scene: Scene) -> None:
-        """pymunk's bodies, and its callbacks."""
-        self._space, self._bodies, self._number = pymunk.Space(), [], {}
+    def _build_broad_phase(self, scene: Scene) -> None:
+        """Make the bodies of pymunk, and callbacks that keep the set of neighbouring pairs."""
+        self._space = pymunk.Space()
+        self._bodies = []
+        number_of_shape = {}
         for i, block in enumerate(scene.blocks):
             kind = pymunk.Body.DYNAMIC if block.moves else pymunk.Body.STATIC
             body = pymunk.Body(self.inertia[i, 0], self.inertia[i, 2], kind)
             body.position = tuple(block.centroid)
             shape = pymunk.Poly(body, block.local.tolist(), radius=float(self.skins[i]))
-            shape.sensor, shape.collision_type = True, 1
+            shape.sensor = True
+            shape.collision_type = 1
             self._space.add(body, shape)
             self._bodies.append(body)
-            self._number[shape] = i
+            number_of_shape[shape] = i
 
         def pair(arbiter: pymunk.Arbiter) -> tuple[int, ...]:
-            return tuple(sorted(self._number[shape] for shape in arbiter.shapes))
+            return tuple(sorted(number_of_shape[shape] for shape in arbiter.shapes))
 
         self._space.on_collision(
-            1, 1, begin=lambda arbiter, *_: self._near.add(pair(arbiter)),
-            separate=lambda arbiter, *_: self._near.discard(pair(arbiter)),
-        )  # fmt: skip
-        self._space.step(1e-9)
+            1,
+            1,
+            begin=lambda arbiter, *_: self._neighbours.add(pair(arbiter)),
+            separate=lambda arbiter, *_: self._neighbours.discard(pair(arbiter)),
+        )
+        self._space.step(BROAD_PHASE_STEP)
 
-    def near(self) -> np.ndarray:
-        """Pairs (p, 2) of blocks whose gap is below the sum of their skins, or almost."""
-        for i in np.flatnonzero(self.mobile).tolist():
+    def neighbour_pairs(self) -> np.ndarray:
+        """Pairs (p, 2) of blocks whose gap is below the sum of their skins, approximately."""
+        for i in np.flatnonzero(self.is_mobile).tolist():
             x, y, angle = self.motion[:3, i].tolist()
-            self._bodies[i].position, self._bodies[i].angle = (x, y), angle
-        self._space.step(1e-9)  # pymunk looks for pairs in a step, in which nothing moves
-        pairs = np.array(sorted(self._near), int).reshape(-1, 2)
-        return pairs[~self.gone[pairs].any(axis=1)]
+            self._bodies[i].position = x, y
+            self._bodies[i].angle = angle
+        self._space.step(BROAD_PHASE_STEP)
+        pairs = np.array(sorted(self._neighbours), int).reshape(-1, 2)
+        return pairs[~self.is_removed[pairs].any(axis=1)]
 
     def remove(self, rows: list[int]) -> None:
-        """Take blocks away: nothing moves or meets them any more."""
-        self.gone[rows] = True
-        for array in (self.mobile, self.free, self.root, self.lightness):
+        """Remove blocks: they neither move nor touch other blocks any more."""
+        self.is_removed[rows] = True
+        for array in (
+            self.is_mobile,
+            self.is_free,
+            self.inverse_sqrt_inertia,
+            self.inverse_mass,
+        ):
             array[rows] = 0
-        self.motion[3:, rows] = self.velocity[:, rows] = 0.0
+        self.motion[3:, rows] = 0.0
+        self.velocity[:, rows] = 0.0
 
-    def damping(self, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
-        """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass of the two blocks);
-        stiffness in N/m. Each block carries half of a joint."""
-        light = self.lightness[contacts.a] + self.lightness[contacts.b]
-        return 2.0 * np.sqrt(stiffness * (0.5 / np.where(light > 0, light, np.inf)))
+    def critical_damping(self, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
+        """Critical damping (k,) in N s/m of contacts with a stiffness (k,) in N/m.
 
-    def refuse(self, i: int, dt: float) -> None:
-        """Refuse block i, which moves too far in a step of dt (s) to find its contacts."""
+        2 sqrt(stiffness * reduced mass of the two blocks), with half of a joint for each block.
+        """
+        inverse_mass = self.inverse_mass[contacts.block_a] + self.inverse_mass[contacts.block_b]
+        reduced_mass = 0.5 / np.where(inverse_mass > 0, inverse_mass, np.inf)
+        return 2.0 * np.sqrt(stiffness * reduced_mass)
+
+    def refuse_speed(self, i: int, dt: float) -> None:
+        """Raise SceneError for block i, too fast for a step dt (s) to find all its contacts."""
         u, v, spin = np.abs(self.velocity[:, i])
-        path, most = (u + v + spin * self.reach[i]) * dt, MOVED * self.skins[i]
+        path = (u + v + spin * self.radius[i]) * dt
+        limit = MAX_SKIN_PER_STEP * self.skins[i]
         raise SceneError(
-            f"block {self.names[i]!r} moves {path:.3g} m in one step: must stay below {most:.3g} m "
-            "(a quarter of its skin, run.skin); resume with a smaller step"
+            f"block {self.names[i]!r} moves {path:.3g} m in one step: must stay below "
+            f"{limit:.3g} m (a quarter of its skin, run.skin); resume with a smaller step"
         )
 
 
 def apply_loads(scene: Scene, blocks: Blocks, manager: ContactManager) -> np.ndarray:
-    """Bring the loads of the blocks to what they are with their edges where these are now; returns
-    how much more they are (n, 3).
+    """Update the loads of the blocks for the present places of their edges; their change (n, 3).
 
-    Water presses on all edges, so the joints carry what is left, the effective stress. The pressure
-    that is given for the joints of a law presses on both faces where edges lie on each other:
-    uniform, it is the same as half of it at either end.
+    Water acts on all edges, so the joints carry the rest, the effective stress. The water pressure
+    of the joints of a law acts on both faces where edges lie on each other; being uniform, it is
+    the same as half of it at either end of the overlap.
     """
-    given = [stress for stress in (scene.water, scene.in_situ) if stress]
-    if not (given or scene.wet or scene.stages):
+    stresses = [stress for stress in (scene.water, scene.in_situ) if stress]
+    if not (stresses or scene.wet or scene.stages):
         return 0.0 * blocks.loads
-    contacts, loads, before = manager.contacts, blocks.steady + blocks.support, blocks.loads.copy()
-    for stress in given:
-        loads += scene.thickness * _on_edges(stress, contacts.outlines, blocks.motion)
+    contacts = manager.contacts
+    old_loads = blocks.loads.copy()
+    loads = blocks.steady_loads + blocks.support
+    for stress in stresses:
+        loads += scene.thickness * _stress_on_edges(stress, contacts.outlines, blocks.motion)
     pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[manager.law]
-    push = pressure * contacts.carried.sum(axis=0) * scene.thickness
+    push = pressure * contacts.overlap_length.sum(axis=0) * scene.thickness
     loads += contacts.assemble(blocks.motion, push, 0.0 * push)
-    blocks.loads[:] = loads * blocks.mobile
-    return blocks.loads - before
+    blocks.loads[:] = loads * blocks.is_mobile
+    return blocks.loads - old_loads
 
 
-def _on_edges(stress: Stress, outlines: Outlines, motion: np.ndarray) -> np.ndarray:
-    """Forces and torques (n, 3) per m of thickness of a stress on edges of the blocks.
+def _stress_on_edges(stress: Stress, outlines: Outlines, motion: np.ndarray) -> np.ndarray:
+    """Forces and torques (n, 3) of a stress on edges of the blocks, per m of thickness.
 
-    An edge is split where the line bends and where it crosses the line. Along each part a to b of
-    length L the stress goes straight from u_a to u_b: the force is -S.n L (u_a + u_b)/2, at
-    a + (b - a)(u_a + 2 u_b)/(3 (u_a + u_b)).
+    An edge is split where the line of the stress bends and where the edge crosses it. Along each
+    part from a to b, of length L, the stress varies linearly from u_a to u_b. Its force is
+    -S.n L (u_a + u_b)/2 and acts at a + (b - a)(u_a + 2 u_b)/(3 (u_a + u_b)).
     """
-    p, block = outlines.placed, outlines.block
-    centre, along = (motion[0] + 1j * motion[1])[block, None], (p[outlines.after] - p)[:, None]
-    bends = (stress.line[:, 0] - p.real[:, None]) / np.where(along.real, along.real, np.inf)
-    ends = 0.0 * along.real, np.sort(np.clip(bends, 0.0, 1.0)), 0.0 * along.real + 1.0
-    at = p[:, None] + np.concatenate(ends, axis=1) * along
-    a, b = at[:, :-1], at[:, 1:]
-    da, db = stress.signed(a), stress.signed(b)
-    crossing = a + (b - a) * da / np.where(da == db, 1.0, da - db)
-    crosses = (da > 0) != (db > 0)
-    a, b = np.where(crosses & (da <= 0), crossing, a), np.where(crosses & (db <= 0), crossing, b)
-    ua, ub = np.maximum(da, 0.0), np.maximum(db, 0.0)
-    push = stress.on(1j * (b - a)) * stress.edges[:, None]  # minus the outward normal, times L
-    arms = ((a - centre) * (2 * ua + ub) + (b - centre) * (ua + 2 * ub)) / 6
-    force, couple = push * (ua + ub) / 2, (arms.conj() * push).imag
-    parts = (part.sum(axis=1) for part in (force.real, force.imag, couple))
-    return np.stack([np.bincount(block, part, motion.shape[1]) for part in parts], axis=1)
+    start = outlines.corner_position
+    block = outlines.block
+    centroid = (motion[0] + 1j * motion[1])[block, None]
+    along = (start[outlines.next] - start)[:, None]
+    run = np.where(along.real, along.real, np.inf)
+    bends = np.sort(np.clip((stress.line[:, 0] - start.real[:, None]) / run, 0.0, 1.0))
+    zero = 0.0 * along.real
+    splits = start[:, None] + np.concatenate([zero, bends, zero + 1.0], axis=1) * along
+    a = splits[:, :-1]
+    b = splits[:, 1:]
+    depth_a = stress.signed(a)
+    depth_b = stress.signed(b)
+    difference = np.where(depth_a == depth_b, 1.0, depth_a - depth_b)
+    crossing = a + (b - a) * depth_a / difference
+    crosses = (depth_a > 0) != (depth_b > 0)
+    a = np.where(crosses & (depth_a <= 0), crossing, a)
+    b = np.where(crosses & (depth_b <= 0), crossing, b)
+    u_a = np.maximum(depth_a, 0.0)
+    u_b = np.maximum(depth_b, 0.0)
+    inward = 1j * (b - a)  # minus the outward normal, times the length
+    push = stress.on(inward) * stress.edges[:, None]
+    force = push * (u_a + u_b) / 2
+    arms = ((a - centroid) * (2 * u_a + u_b) + (b - centroid) * (u_a + 2 * u_b)) / 6
+    torque = (arms.conj() * push).imag
+    sums = [part.sum(axis=1) for part in (force.real, force.imag, torque)]
+    return np.stack([np.bincount(block, part, motion.shape[1]) for part in sums], axis=1)

@@ -1,61 +1,86 @@
-"""The energy energy_balance: where every joule went, consistent with the leapfrog's half steps.
+"""The energy balance of a run: where every joule went.
 
-Velocities live between positions, so the kinetic energy at a position is half of mass times the
-product of the velocities before and after it; its change over a step is then exactly the trapezoid
-of forces times displacement, and that is how every other entry is summed (`book` in blocks.c).
+In every step
+
+    kinetic + potential + stored + friction + dashpots + dropped - work = start
+
+holds to rounding for everything that the blocks do, so an error of the balance measures only what
+the joint law gains or loses in a finite step, and contacts that begin or end. It is the check that
+the time step is small enough, and that no contact is missed.
+
+Time levels. In symplectic Euler, positions x_i are at full steps and velocities v_(i+1/2) between
+them: v_(i+1/2) = v_(i-1/2) + dt F_i/m and x_(i+1) = x_i + dt v_(i+1/2). The kinetic energy at a
+full step is half of the mass times the product of the velocities before and after it, not a square.
+Its change over a step is then exactly the displacement dt v_(i+1/2) times the mean of the forces at
+both ends, the trapezoidal rule. Every other entry is summed by the same rule: the work of drives
+and dashpots from the mean of their forces before and after the step, gravity and loads from their
+constant values. Joints have a potential of their own, the stored energy, and dissipate on the area
+that they have at the end of the step.
+
+What leaves the balance for good. "friction": energy dissipated by the joints; "dashpots": by
+viscous damping; "dropped": stored energy of contacts that were given up while they still bore load,
+or became shorter.
+
+`native/blocks.c` adds the entries of each step; this module opens the balance and reads it.
 """
 
 import numpy as np
 
 from ..contact import Joints
+from ..native.layout import ENERGIES
 from .blocks import Blocks
 
-COLUMNS = ("kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned")
 KINETIC, STORED, DROPPED, WORK, TURNED = (
-    COLUMNS.index(name) for name in ("kinetic", "stored", "dropped", "work", "turned")
+    ENERGIES.index(name) for name in ("kinetic", "stored", "dropped", "work", "turned")
 )
 
 
 class EnergyBalance:
-    """Energies in J: kinetic + potential + stored + friction + dashpots + dropped = start + work.
+    """Energies in J: kinetic + potential + stored + friction + dashpots + dropped - work = start.
 
-    energy (8,): by COLUMNS. friction: dissipated in the joints; dropped: stored in contacts that
-    were given up while they still carried; work: done by drives, loads and water; turned:
-    gravity's, the drives' and the loads' power summed in absolute value, plus what was there at
-    the start. start: the balance at time 0. Of the end of the last step: forces (3, n, 3) in N:
-    all, dashpots, drives; last (2, n, 3): dashpots and drives before it; area (k,) in m2 and
-    dissipated energy `lost` (k,) in J/m2 of the joints. The compiled step writes all of them.
+    energy (8,): in the order of `ENERGIES`. work: done by drives, loads and water; turned: sum of
+    the absolute work of gravity, drives and loads, plus the energy at the start, to which errors
+    are related. start: the balance at time 0. forces (3, n, 3) in N: total, dashpots and drives at
+    the end of the last step; previous_forces (2, n, 3): dashpots and drives one step before. area
+    (k,) in m2: of the joints at the end of the last step; booked_dissipation (k,) in J/m2: their
+    dissipated energy that is in the balance. The compiled step writes all of these.
     """
 
     def __init__(self, blocks: int) -> None:
-        self.energy, self.start = np.zeros(len(COLUMNS)), 0.0
-        self.forces, self.last = np.zeros((3, blocks, 3)), np.zeros((2, blocks, 3))
-        self.area, self.lost = np.zeros(0), np.zeros(0)
+        self.energy = np.zeros(len(ENERGIES))
+        self.start = 0.0
+        self.forces = np.zeros((3, blocks, 3))
+        self.previous_forces = np.zeros((2, blocks, 3))
+        self.area = np.zeros(0)
+        self.booked_dissipation = np.zeros(0)
 
     def open(self, blocks: Blocks, joints: Joints, dt: float) -> None:
-        """Begin at time 0, when the velocities of the blocks' motion hold."""
-        kick, v = 0.5 * dt * self.forces[0] / blocks.inertia, blocks.motion[3:].T
-        self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - kick**2)).sum()
+        """Set the energies at time 0, the time of the velocities in the blocks' motion."""
+        half_step = 0.5 * dt * self.forces[0] / blocks.inertia
+        v = blocks.motion[3:].T
+        self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - half_step**2)).sum()
         self.energy[STORED] = self.area @ joints.stored_energy
         self.start = float(self.energy[KINETIC] + self.energy[STORED])
         self.energy[TURNED] = self.start
 
-    def load(self, blocks: Blocks, more: np.ndarray, dt: float) -> None:
-        """Loads have changed by `more` (n, 3) within a step dt (s): it books the whole of the new
-        ones, and is to have the mean."""
-        self.energy[WORK] -= 0.5 * dt * (more * blocks.motion[3:].T).sum()
+    def change_loads(self, blocks: Blocks, change: np.ndarray, dt: float) -> None:
+        """Correct the work of loads that change by `change` (n, 3) within a step dt (s).
+
+        The step adds the work of the new loads; by the trapezoidal rule it is that of the mean.
+        """
+        self.energy[WORK] -= 0.5 * dt * (change * blocks.motion[3:].T).sum()
 
     @property
     def value(self) -> dict[str, float]:
-        """The energies by name."""
-        return dict(zip(COLUMNS, self.energy.tolist(), strict=True))
+        """The energies (J) by name."""
+        return dict(zip(ENERGIES, self.energy.tolist(), strict=True))
 
     @property
     def total(self) -> float:
-        """What the balance says is constant (J)."""
+        """The sum (J) that the balance states to be constant."""
         return float(self.energy[:WORK].sum() - self.energy[WORK])
 
     @property
     def error(self) -> float:
-        """Imbalance as a share of the energy turned over."""
+        """Imbalance as a fraction of the energy turned over."""
         return (self.total - self.start) / max(float(self.energy[TURNED]), 1e-300)

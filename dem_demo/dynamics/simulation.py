@@ -1,6 +1,16 @@
-"""A scene in motion: blocks, contacts and joints, one step after another; and its states.
+"""A scene in motion: blocks, contacts and joints, step by step; excavation; saved states.
 
-`state.npz` holds its version, the text of the scene and of the files that this names, and arrays.
+`state.npz` holds its version, the text of the scene and of the files that the scene names, and the
+arrays of the state.
+
+Excavation. Blocks of a stage are removed at the time of the stage, or, if it has none, when the
+rock is at rest. To remove a block at once would release its forces in one step, an impact that no
+real excavation makes. The forces that the removed blocks exert on the others are therefore kept as
+a load (`Blocks.support`), which is ramped to zero over the release time of the stage. A step in
+which the blocks are removed changes no force on the rest. The joints of removed blocks end; their
+stored energy is entered as dropped, and the support does work as any other load does. A stage waits
+until the support of the one before is gone. At rest are blocks whose velocity and acceleration are
+small: not all of them, for a single loose stone that rattles must not delay an excavation for ever.
 """
 
 import io
@@ -13,274 +23,384 @@ import numpy as np
 
 from jointlaw.support.files import write_files
 
-from ..contact import PARTS, STALE, ContactManager, Contacts, Joints
+from ..contact import MAX_SKIN_UNTIL_REBUILD, STATE_PARTS, ContactManager, Contacts, Joints
 from ..scene import Files, Scene, SceneError, parse
-from .blocks import MOVED, Blocks, apply_loads
+from .blocks import MAX_SKIN_PER_STEP, Blocks, apply_loads
 from .energy_balance import DROPPED, EnergyBalance
-from .equilibrium import begin, out_of_balance, seat
-from .timestep import SAFE, StepLimit, impact_limit
+from .equilibrium import create_joints, find_unbalanced, settle
+from .timestep import MAX_FRACTION_OF_LIMIT, TimeStepLimit, impact_limit
 
-NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
-MATCH = 1e-6  # relative: lengths that are equal but for rounding
-TINY = 1e-300  # in place of nothing, below a line
-LOOKS = 16  # steps between two looks at the drives and at excavations
-SLOW, EVEN, RESTING = 1e-4, 0.1, 0.9  # m/s, m/s2: below which a block rests; share that must
-FRACTIONS = {  # of the limit that a time step is, by what can happen
+WIDE_MARGIN = 0.4  # fraction of the limit: a step below it stays stable as lever arms change
+LENGTH_TOLERANCE = 1e-6  # relative: lengths that differ by rounding only
+TINY = 1e-300  # lower bound of a denominator
+CHECK_INTERVAL = 16  # steps between two checks of drives and of excavation stages
+RESTING_SPEED = 1e-4  # m/s
+RESTING_ACCELERATION = 0.1  # m/s2
+RESTING_FRACTION = 0.9  # of the blocks that must be at rest for the next stage
+FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
     "blocks fall or have no equilibrium": 0.15,
     "drives move blocks": 0.4,
     "the blocks are in equilibrium": 0.7,
 }
-IMPACT = 1e4  # Pa: normal stress of a first impact, for a time step before anything touches
-HALVINGS = 8  # of a time step that was chosen, until a run is refused
-FILE, VERSION = "state.npz", 9
-KEPT = (  # of what changes in a run, but for the joints: arrays that stay in their place
-    "blocks.motion", "blocks.velocity", "blocks.loads", "blocks.gone", "blocks.support",
-    "blocks.drives.reversed_at", "stage_start_times",
-    "manager.renewed_at", "manager.urgent", "energy_balance.energy", "energy_balance.forces",
-)  # fmt: skip
+IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
+MAX_HALVINGS = 8  # of a time step that was chosen automatically
+FILE = "state.npz"
+VERSION = 10
+UPDATED_IN_PLACE = (  # arrays of the state that the compiled step, or views of them, refer to
+    "blocks.motion",
+    "blocks.velocity",
+    "blocks.loads",
+    "blocks.is_removed",
+    "blocks.support",
+    "blocks.drives.reversed_at",
+    "stage_start_times",
+    "manager.rebuilt_at",
+    "manager.needs_rebuild",
+    "energy_balance.energy",
+    "energy_balance.forces",
+)
 STATE = (
-    *KEPT, "t0", "n", "dt", "halvings",
-    "limit.current", "limit.lowest", "limit.bound", "limit.checked_stiffness",
-    "manager.keys", "manager.law", "manager.offset",
-    "energy_balance.start", "energy_balance.area", "energy_balance.lost", "unstable", "initial",
-)  # fmt: skip
-PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew
-Saved = dict[str, np.ndarray]  # a copy of everything that the future depends on
+    *UPDATED_IN_PLACE,
+    "time_of_last_change",
+    "steps_since_change",
+    "dt",
+    "halvings_left",
+    "limit.current",
+    "limit.lowest",
+    "limit.lowest_bound",
+    "limit.checked_stiffness",
+    "manager.edge_pairs",
+    "manager.law",
+    "manager.closure_offset",
+    "energy_balance.start",
+    "energy_balance.area",
+    "energy_balance.booked_dissipation",
+    "unstable",
+    "initial",
+)
+CONTACT_ROWS = "contacts.corner", "contacts.edge"  # from which the contacts are made
+SavedState = dict[str, np.ndarray]  # a copy of everything that later steps depend on
 
 
 class Simulation:
-    """A scene in motion. `step()` advances it; from a `state()` it goes on bit for bit.
+    """A scene in motion. `step()` advances it; a run from a `state()` is bitwise reproducible.
 
-    step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
-    are; manager: their contacts; joints: the law; energy_balance: the energies; limit: of the time
-    step dt (s), chosen for the reason `fraction_reason`; unstable (blocks,): without static
-    equilibrium at step 0; initial (6, blocks): motion there; stage_start_times (stages,): when
-    stages of the excavation began, inf before (s). Where neither `step` nor the scene sets the time
-    step, it is halved when joints close too far for it, or blocks become too fast.
-    Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
-    SceneError for a start that the method cannot carry.
+    step: time step (s) instead of the scene's; saved: a state to continue from.
+
+    blocks, manager (of contacts), joints, energy_balance: the parts of the simulation; limit: of
+    the time step `dt` (s), which is chosen for the reason `fraction_reason`. unstable (blocks,):
+    blocks without static equilibrium at step 0; initial (6, blocks): motion at step 0;
+    stage_start_times (stages,): when the stages of the excavation began (s), infinite before.
+
+    Where neither `step` nor the scene sets the time step, it is halved when joints close too far
+    for it, or blocks become too fast. Raises ValueError for a step that is not a finite number > 0
+    and for a state of another scene, SceneError for an initial state that the method cannot treat.
     """
 
-    def __init__(self, scene: Scene, step: float | None = None, saved: Saved | None = None) -> None:
+    def __init__(
+        self, scene: Scene, step: float | None = None, saved: SavedState | None = None
+    ) -> None:
         if step is not None and not 0 < step < np.inf:
             raise ValueError(f"step = {step} s: must be a finite number > 0")
-        self.scene, self.blocks = scene, Blocks(scene)
-        self.manager, self.joints = ContactManager(scene, self.blocks.motion), Joints(scene)
-        self.limit, self.t0, self.n, self.fraction_reason = StepLimit(), 0.0, 0, ""
-        self.halvings = 0 if step or scene.run.step or scene.run.fraction else HALVINGS
-        self.energy_balance, self.stage_start_times = (
-            EnergyBalance(len(scene.blocks)),
-            np.full(len(scene.stages), np.inf),
-        )
+        self.scene = scene
+        self.blocks = Blocks(scene)
+        self.manager = ContactManager(scene, self.blocks.motion)
+        self.joints = Joints(scene)
+        self.energy_balance = EnergyBalance(len(scene.blocks))
+        self.limit = TimeStepLimit()
+        self.time_of_last_change = 0.0  # of the time step (s)
+        self.steps_since_change = 0
+        self.fraction_reason = ""
+        is_step_given = step or scene.run.step or scene.run.fraction
+        self.halvings_left = 0 if is_step_given else MAX_HALVINGS
+        self.stage_start_times = np.full(len(scene.stages), np.inf)
         if saved:
-            self._unpack(saved, step)
+            self._restore(saved, step)
         else:
             self._start(step)
 
     @property
     def time(self) -> float:
         """Model time (s)."""
-        return self.t0 + self.n * self.dt
+        return self.time_of_last_change + self.steps_since_change * self.dt
 
     @property
     def contacts(self) -> Contacts:
-        """The contacts at the blocks' places of now."""
+        """The contacts at the present places of the blocks."""
         return self.manager.contacts
 
-    def step(self) -> None:
-        """One time step. Raises SceneError for a state that the method cannot carry.
+    # ------------------------------------------------------------------ one time step
 
-        1. The blocks move. Their contacts follow to where they are by now; new ones are looked for
-           if blocks have moved far. An excavation takes blocks away, or lets their support go.
-        2. Closure is the depth from the geometry, sliding the velocity times the step: the joints
-           say tractions.
-        3. Tractions, dashpots, weight and drives make forces, and these the next velocities; the
-           energies are booked.
-        4. Check the time step if a joint has stiffened; send back drives.
+    def step(self) -> None:
+        """Advance by one time step.
+
+        1. Blocks move; their contacts are updated, and searched again where blocks have moved far.
+           An excavation removes blocks, or releases their support.
+        2. The joints take a step: closure from the geometry, sliding from velocity times step.
+        3. Tractions, dashpots, weight, loads and drives give forces, energies, new velocities.
+        4. The time step is checked if a joint has stiffened; drives are reversed when due.
+
+        Raises SceneError for a state that the method cannot treat.
         """
-        world, drives = self.world, self.blocks.drives
-        world.call("before", self.dt)
-        while world.fast >= 0:
-            if not self._halve():
-                self.blocks.refuse(world.fast, self.dt)
-            world.call("before", self.dt)
+        self._move_blocks()
         if self.scene.stages:
-            self._dig()
-        if world.moved or world.stale:
-            self._renew()
-            world = self.world
-        if world.deep >= 0:
-            pair = self.contacts.a[world.deep], self.contacts.b[world.deep]
-            self.manager.refuse(pair, self.contacts.closure[world.deep])
+            self._excavate()
+        if self.arrays.transferred or self.arrays.rebuild:
+            self._update_contact_list()
+        if self.arrays.too_deep >= 0:
+            self._refuse_overlap(self.arrays.too_deep)
         self.joints.advance(self.scene.run.law_steps)
-        self.n += 1
+        self.steps_since_change += 1
+        drives = self.blocks.drives
         drives.aim[:] = drives.velocity(self.time, self.dt)
-        world.call("after", self.dt)
-        if world.stiffer:
-            self.limit.look(self.scene, self.blocks, self.contacts, self.joints, self.dt)
-            if self.dt > SAFE * self.limit.current:
-                while self.dt > NEAR * self.limit.current and self._halve():
-                    pass
-            self.limit.require(self.dt)
-            world.bind(checked=self.limit.checked_stiffness)
-        if self.n % LOOKS == 0:
+        self.arrays.call("finish_step", self.dt)
+        if self.arrays.stiffened:
+            self._check_time_step()
+        if self.steps_since_change % CHECK_INTERVAL == 0:
             drives.reverse(self.time, self.shear_displacement)
 
-    def _dig(self) -> None:
-        """Take away the blocks of a stage when its time has come, or, if it has none, when the rock
-        is at rest; then let go what they bore."""
-        blocks, stages, n = (
-            self.blocks,
-            self.scene.stages,
-            int(np.isfinite(self.stage_start_times).sum()),
-        )
-        due = self.n % LOOKS == 0 and n < len(stages)
-        if due and (self._rests() if (at := stages[n]["start"]) is None else self.time >= at):
-            taken, c, joints = stages[n]["blocks"], self.contacts, self.joints
-            mine = (np.isin(c.a, taken) | np.isin(c.b, taken)) * self.scene.thickness
-            stress, shear = mine * c.length * joints.traction.T
-            blocks.support += c.assemble(blocks.motion, stress, -shear, mine * joints.stored_energy)
-            blocks.remove(taken)
-            self.manager.urgent[taken], self.world.stale = True, 1
-            self.stage_start_times[n], n = self.time, n + 1
-        if blocks.support.any():
-            left = self.stage_start_times[n - 1] + stages[n - 1]["release_time"] - self.time
-            blocks.support *= max(left, 0.0) / max(left + self.dt, self.dt)
-            self.energy_balance.load(blocks, apply_loads(self.scene, blocks, self.manager), self.dt)
+    def _move_blocks(self) -> None:
+        """Move the blocks and update their contacts; halve the time step for fast blocks."""
+        self.arrays.call("move_blocks", self.dt)
+        while self.arrays.too_fast >= 0:
+            if not self._halve_time_step():
+                self.blocks.refuse_speed(self.arrays.too_fast, self.dt)
+            self.arrays.call("move_blocks", self.dt)
 
-    def _rests(self) -> bool:
-        """Is no support going, and are almost all blocks slow and in balance?"""
-        blocks, force = self.blocks, self.energy_balance.forces[0].T[:2]
-        speed, pull = np.hypot(*blocks.velocity[:2]), np.hypot(*force) / blocks.inertia[:, 0]
-        moves = np.maximum(speed / SLOW, pull / EVEN)[blocks.mobile[:, 0]]
-        return not blocks.support.any() and bool(np.quantile(moves, RESTING) < 1)
+    def _refuse_overlap(self, row: int) -> None:
+        contacts = self.contacts
+        pair = contacts.block_a[row], contacts.block_b[row]
+        self.manager.refuse_overlap(pair, contacts.closure[row])
 
-    def _halve(self) -> bool:
-        """Go on with half the time step, if it may be halved once more."""
-        if not self.halvings:
+    # ------------------------------------------------------------------ excavation
+
+    def _excavate(self) -> None:
+        """Begin the next stage when it is due, and release the support of removed blocks."""
+        stages = self.scene.stages
+        begun = int(np.isfinite(self.stage_start_times).sum())
+        is_checked = self.steps_since_change % CHECK_INTERVAL == 0
+        if is_checked and begun < len(stages):
+            stage = stages[begun]
+            if self._is_at_rest() if stage["start"] is None else self.time >= stage["start"]:
+                self._remove_blocks(stage["blocks"])
+                self.stage_start_times[begun] = self.time
+                begun += 1
+        if self.blocks.support.any():
+            stage_end = self.stage_start_times[begun - 1] + stages[begun - 1]["release_time"]
+            self._release_support(stage_end - self.time)
+
+    def _remove_blocks(self, removed: list[int]) -> None:
+        """Remove blocks, and keep the forces that they exert on the others as support."""
+        blocks = self.blocks
+        contacts = self.contacts
+        is_removed = np.isin(contacts.block_a, removed) | np.isin(contacts.block_b, removed)
+        thickness = is_removed * self.scene.thickness
+        push, shear = thickness * contacts.length * self.joints.traction.T
+        stored_energy = thickness * self.joints.stored_energy
+        blocks.support += contacts.assemble(blocks.motion, push, -shear, stored_energy)
+        blocks.remove(removed)
+        self.manager.needs_rebuild[removed] = True
+        self.arrays.rebuild = 1
+
+    def _release_support(self, time_left: float) -> None:
+        """Reduce the support linearly, to zero at the end of the time left (s)."""
+        remaining = max(time_left, 0.0) / max(time_left + self.dt, self.dt)
+        self.blocks.support *= remaining
+        change = apply_loads(self.scene, self.blocks, self.manager)
+        self.energy_balance.change_loads(self.blocks, change, self.dt)
+
+    def _is_at_rest(self) -> bool:
+        """Whether no support is being released, and most blocks are slow and balanced."""
+        blocks = self.blocks
+        speed = np.hypot(*blocks.velocity[:2])
+        force = np.hypot(*self.energy_balance.forces[0].T[:2])
+        acceleration = force / blocks.inertia[:, 0]
+        motion = np.maximum(speed / RESTING_SPEED, acceleration / RESTING_ACCELERATION)
+        is_resting = np.quantile(motion[blocks.is_mobile[:, 0]], RESTING_FRACTION) < 1
+        return not blocks.support.any() and bool(is_resting)
+
+    # ------------------------------------------------------------------ the time step
+
+    def _check_time_step(self) -> None:
+        """Compute the limit again; halve a time step that exceeds it."""
+        limit = self.limit
+        limit.update(self.scene, self.blocks, self.contacts, self.joints, self.dt)
+        if self.dt > MAX_FRACTION_OF_LIMIT * limit.current:
+            while self.dt > WIDE_MARGIN * limit.current and self._halve_time_step():
+                pass
+        limit.require_stable(self.dt)
+        self.arrays.bind(limit, "checked_stiffness")
+
+    def _halve_time_step(self) -> bool:
+        """Continue with half the time step; False if it may not be halved any more."""
+        if not self.halvings_left:
             return False
-        self.halvings -= 1
-        self._change_step(0.5 * self.dt)
+        self.halvings_left -= 1
+        self._change_time_step(0.5 * self.dt)
         return True
 
-    def _change_step(self, dt: float) -> None:
-        """Velocities are half a step ahead of the places: bring them to half of a step dt (s)."""
-        blocks, drives, now = self.blocks, self.blocks.drives, self.time
-        blocks.velocity += (
-            0.5 * (dt - self.dt) * self.energy_balance.forces[0] / blocks.inertia * blocks.free
-        ).T
+    def _change_time_step(self, dt: float) -> None:
+        """Continue with the time step dt (s): velocities are half a step ahead of positions."""
+        blocks = self.blocks
+        drives = blocks.drives
+        now = self.time
+        half_change = 0.5 * (dt - self.dt) * self.energy_balance.forces[0] / blocks.inertia
+        blocks.velocity += (half_change * blocks.is_free).T
         blocks.velocity[drives.axes, drives.rows] = drives.velocity(now, dt)
-        self.t0, self.n, self.dt = now, 0, dt
+        self.time_of_last_change = now
+        self.steps_since_change = 0
+        self.dt = dt
 
-    def bind(self) -> None:
-        """Tell the compiled step where all arrays lie, after each change of the contacts."""
-        run, blocks, manager, energy_balance = (
-            self.scene.run,
-            self.blocks,
-            self.manager,
-            self.energy_balance,
-        )
-        self.world = world = self.contacts.world
-        world.thickness, world.parts = self.scene.thickness, run.law_steps
-        world.dashpot_normal, world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
-        world.max_path, world.max_stale, world.driven = MOVED, STALE, len(blocks.drives.rows)
-        world.bind(blocks, "motion", "velocity", "inertia", "gravity", "loads", "lightness",
-                   "reach", "mobile", skin=blocks.skins)  # fmt: skip
-        world.bind(blocks.drives, "rows", "axes", "aim")
-        world.bind(manager, "deepest", "offset", "urgent", renewed=manager.renewed_at)
-        world.bind(energy_balance, "last", "area", "lost", "energy", force=energy_balance.forces)
-        world.bind(checked=self.limit.checked_stiffness)
-        self.joints.bind(world)
-
-    def _start(self, step: float | None) -> None:
-        """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
-        scene, blocks, manager, joints = self.scene, self.blocks, self.manager, self.joints
-        slid = begin(scene, blocks, manager, joints)
-        if scene.run.settle and joints.n and blocks.free.any():
-            slid = seat(scene, blocks, manager, joints, slid)
-        manager.follow(blocks.motion)
-        self.initial = blocks.motion.copy()
-        joints.update(manager.closure, slid)
-        self.unstable = out_of_balance(scene, blocks, self.contacts, joints)
-        self.limit.look(scene, blocks, self.contacts, joints)
-        self.dt = step or scene.run.step or self._chosen_step()
-        self.limit.require(self.dt)
-        blocks.drives.aim[:] = blocks.drives.velocity(0.0, self.dt)
-        blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = blocks.drives.aim
-        manager.follow(blocks.motion)
-        self.energy_balance.area = self.contacts.length * scene.thickness
-        self.energy_balance.lost = joints.lost.copy()
-        self.bind()
-        self.world.call("forces", 0.5 * self.dt)
-        self.energy_balance.open(blocks, joints, self.dt)
-        blocks.motion[3:] += (
-            0.5 * self.dt * self.energy_balance.forces[0] / blocks.inertia * blocks.free
-        ).T
-        blocks.velocity[:] = blocks.motion[3:]
-
-    def _chosen_step(self) -> float:
-        """By the scene's fraction of the limit, or else by one for what can happen."""
-        scene, limit = self.scene, self.limit.current
+    def _choose_time_step(self) -> float:
+        """Time step (s): the scene's fraction of the limit, or a fraction for what can happen."""
+        scene = self.scene
+        limit = self.limit.current
         if not np.isfinite(limit):  # nothing touches yet
             stiffness = max(
-                float(np.interp(IMPACT, held.curve["stress"], held.curve["stiffness"]))
-                for held in self.joints.by_law
+                float(np.interp(IMPACT_STRESS, joints.curve["stress"], joints.curve["stiffness"]))
+                for joints in self.joints.by_law
             )
             limit = impact_limit(scene, self.blocks, self.manager.outlines, stiffness)
         if not np.isfinite(limit):
             raise SceneError("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
             return scene.run.fraction * limit
-        falls = not scene.run.settle or self.unstable.any() or self.blocks.velocity.any()
-        driven = any(len(drive.times) > 1 for drive in scene.drives)
-        self.fraction_reason = [*FRACTIONS][0 if falls else 1 if driven else 2]
-        return FRACTIONS[self.fraction_reason] * limit
+        can_fall = not scene.run.settle or self.unstable.any() or self.blocks.velocity.any()
+        is_driven = any(len(drive.times) > 1 for drive in scene.drives)
+        falling, driven, resting = FRACTIONS_OF_LIMIT
+        if can_fall:
+            self.fraction_reason = falling
+        else:
+            self.fraction_reason = driven if is_driven else resting
+        return FRACTIONS_OF_LIMIT[self.fraction_reason] * limit
 
-    def _renew(self) -> None:
-        """Update joints, energies and limit for transferred and new contacts."""
-        blocks, manager, joints = self.blocks, self.manager, self.joints
-        energy_balance, limit = self.energy_balance, self.limit
-        if self.world.moved:
-            self._transfer()
-        if self.world.stale:
-            if self.dt > NEAR * limit.current:  # lever arms have changed
-                limit.checked_stiffness[:] = 0.0
-            before = manager.renew(blocks.motion, blocks.near(), pressed=False)
-            stored = energy_balance.area * joints.stored_energy
-            stored[before[before >= 0]] = 0.0
-            energy_balance.energy[DROPPED] += stored.sum()
-            energy_balance.area = np.append(energy_balance.area, 0.0)[before]
-            limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[before]
-            joints.rearrange(before, manager.law, manager.keys, started=True)
-            energy_balance.lost = joints.lost.copy()
-            self.bind()
-            energy_balance.load(blocks, apply_loads(self.scene, blocks, manager), self.dt)
-        self.world.call("press", self.dt)
+    # ------------------------------------------------------------------ start
 
-    def _transfer(self) -> None:
-        """Joints and energy_balance for contacts whose corners went on to other edges.
+    def _start(self, step: float | None) -> None:
+        """Initialise at step 0: equilibrium, time step, velocities half a step ahead."""
+        scene = self.scene
+        blocks = self.blocks
+        manager = self.manager
+        joints = self.joints
+        sliding = create_joints(scene, blocks, manager, joints)
+        if scene.run.settle and joints.n and blocks.is_free.any():
+            sliding = settle(scene, blocks, manager, joints, sliding)
+        manager.update(blocks.motion)
+        self.initial = blocks.motion.copy()
+        joints.update(manager.closure, sliding)
+        self.unstable = find_unbalanced(scene, blocks, self.contacts, joints)
+        self.limit.update(scene, blocks, self.contacts, joints)
+        self.dt = step or scene.run.step or self._choose_time_step()
+        self.limit.require_stable(self.dt)
+        drives = blocks.drives
+        drives.aim[:] = drives.velocity(0.0, self.dt)
+        blocks.motion[3:][drives.axes, drives.rows] = drives.aim
+        manager.update(blocks.motion)
+        balance = self.energy_balance
+        balance.area = self.contacts.length * scene.thickness
+        balance.booked_dissipation = joints.dissipated_energy.copy()
+        self.bind()
+        self.arrays.call("compute_forces", 0.5 * self.dt)
+        balance.open(blocks, joints, self.dt)
+        half_step = 0.5 * self.dt * balance.forces[0] / blocks.inertia
+        blocks.motion[3:] += (half_step * blocks.is_free).T
+        blocks.velocity[:] = blocks.motion[3:]
 
-        Lengths match wherever an edge that lies on another, or a corner that stands on an edge,
-        goes on to the same. Else a joint that became shorter drops what it stored on the rest. One
-        that became longer would create energy: it starts anew instead, at a closure at which it
-        holds what the shorter one held; the rest of the depth becomes its closure offset.
+    def bind(self) -> None:
+        """Bind all arrays to the compiled step, after each change of the list of contacts."""
+        run = self.scene.run
+        blocks = self.blocks
+        drives = blocks.drives
+        manager = self.manager
+        balance = self.energy_balance
+        arrays = self.contacts.step_arrays
+        arrays.thickness = self.scene.thickness
+        arrays.law_steps = run.law_steps
+        arrays.dashpot_normal = run.dashpot_normal
+        arrays.dashpot_shear = run.dashpot_shear
+        arrays.max_skin_per_step = MAX_SKIN_PER_STEP
+        arrays.max_skin_until_rebuild = MAX_SKIN_UNTIL_REBUILD
+        arrays.n_driven = len(drives.rows)
+        arrays.bind(
+            blocks, "motion", "velocity", "inertia", "gravity", "loads", "inverse_mass", "radius",
+            "is_mobile", skin=blocks.skins,
+        )  # fmt: skip
+        arrays.bind(driven_block=drives.rows, driven_axis=drives.axes, driven_velocity=drives.aim)
+        arrays.bind(manager, "max_overlap", "closure_offset", "needs_rebuild", "rebuilt_at")
+        arrays.bind(balance, "forces", "previous_forces", "area", "booked_dissipation", "energy")
+        arrays.bind(self.limit, "checked_stiffness")
+        self.joints.bind(arrays)
+        self.arrays = arrays
+
+    # ------------------------------------------------------------------ contacts that change
+
+    def _update_contact_list(self) -> None:
+        """Bring joints, energies and limit up to date with transferred and new contacts."""
+        if self.arrays.transferred:
+            self._transfer_joints()
+        if self.arrays.rebuild:
+            self._rebuild_contacts()
+        self.arrays.call("set_increments", self.dt)
+
+    def _rebuild_contacts(self) -> None:
+        """Rebuild the list of contacts; drop the energy of the joints that end."""
+        blocks = self.blocks
+        manager = self.manager
+        joints = self.joints
+        balance = self.energy_balance
+        limit = self.limit
+        if self.dt > WIDE_MARGIN * limit.current:  # lever arms have changed
+            limit.checked_stiffness[:] = 0.0
+        pairs = blocks.neighbour_pairs()
+        old_row = manager.rebuild(blocks.motion, pairs, keep_closure=False)
+        stored_energy = balance.area * joints.stored_energy
+        stored_energy[old_row[old_row >= 0]] = 0.0
+        balance.energy[DROPPED] += stored_energy.sum()
+        balance.area = np.append(balance.area, 0.0)[old_row]
+        limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[old_row]
+        joints.rearrange(old_row, manager.law, manager.edge_pairs, started=True)
+        balance.booked_dissipation = joints.dissipated_energy.copy()
+        self.bind()
+        change = apply_loads(self.scene, blocks, manager)
+        balance.change_loads(blocks, change, self.dt)
+
+    def _transfer_joints(self) -> None:
+        """Update joints and energies of contacts whose corners went on to other edges.
+
+        The length of joint is the same before and after where an edge that lies on another, or a
+        corner that stands on an edge, goes on to one that does the same. Otherwise a joint that has
+        become shorter drops the energy stored on the rest. One that has become longer would create
+        energy: it starts as new instead, at the closure at which it stores the energy of the
+        shorter one, and the remaining depth becomes its closure offset.
         """
-        energy_balance, manager, joints = self.energy_balance, self.manager, self.joints
-        thickness, length, before = self.scene.thickness, self.contacts.length, self.contacts.was
-        held, ratio = joints.stored_energy * before, length / np.maximum(before, TINY)
-        changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0))
-        longer, kept = ratio[changed] > 1, joints.stored_energy[changed]
-        energy_balance.area[changed] = length[changed] * thickness
-        if longer.any():
-            fresh, closure = changed[longer], manager.closure[changed[longer]]
-            anew, kept[longer] = joints.renew(fresh, held[fresh] / length[fresh], closure)
-            manager.offset[fresh] += closure - anew
-            energy_balance.lost[fresh] = 0.0
-        lost = held[changed] - kept * length[changed]
-        energy_balance.energy[DROPPED] += np.maximum(lost, 0.0).sum() * thickness
+        balance = self.energy_balance
+        manager = self.manager
+        joints = self.joints
+        thickness = self.scene.thickness
+        length = self.contacts.length
+        old_length = self.contacts.previous_length
+        old_energy = joints.stored_energy * old_length  # J/m
+        ratio = length / np.maximum(old_length, TINY)
+        has_changed = (np.abs(ratio - 1) > LENGTH_TOLERANCE) & (old_energy > 0)
+        changed = np.flatnonzero(has_changed)
+        is_longer = ratio[changed] > 1
+        new_energy = joints.stored_energy[changed]  # J/m2
+        balance.area[changed] = length[changed] * thickness
+        if is_longer.any():
+            restarted = changed[is_longer]
+            closure = manager.closure[restarted]
+            new_closure, new_energy[is_longer] = joints.restart(
+                restarted, old_energy[restarted] / length[restarted], closure
+            )
+            manager.closure_offset[restarted] += closure - new_closure
+            balance.booked_dissipation[restarted] = 0.0
+        dropped = old_energy[changed] - new_energy * length[changed]
+        balance.energy[DROPPED] += np.maximum(dropped, 0.0).sum() * thickness
+
+    # ------------------------------------------------------------------ means over a joint
 
     def area_fractions(self, moving: int, base: int) -> np.ndarray:
-        """Share (k,) of each contact in the area of the joint between two blocks; zeros without."""
+        """Fraction (k,) of each contact in the area of the joint between two blocks."""
         area = self.energy_balance.area * self.manager.between(moving, base)
         return area / max(area.sum(), TINY)
 
@@ -288,40 +408,51 @@ class Simulation:
         """Shear displacement (m) of the joint between two blocks, mean over its area."""
         return abs(float(self.area_fractions(moving, base) @ self.joints.delta[:, 1]))
 
-    def state(self) -> Saved:
-        """A copy of everything that the future depends on."""
-        return self.joints.snapshot() | {
-            path: np.array(attrgetter(path)(self)) for path in (*STATE, *PLACES)
-        }
+    # ------------------------------------------------------------------ saved states
 
-    def _unpack(self, saved: Saved, step: float | None) -> None:
+    def state(self) -> SavedState:
+        """A copy of everything that later steps depend on."""
+        arrays = {path: np.array(attrgetter(path)(self)) for path in (*STATE, *CONTACT_ROWS)}
+        return self.joints.snapshot() | arrays
+
+    def _restore(self, saved: SavedState, step: float | None) -> None:
+        """Return to a saved state; with `step`, continue with this time step (s)."""
         for path in STATE:
-            holder, _, name = path.rpartition(".")
-            of, value = attrgetter(holder)(self) if holder else self, saved[path]
-            if path in KEPT:
-                getattr(of, name)[:] = value
+            holder_path, _, name = path.rpartition(".")
+            holder = attrgetter(holder_path)(self) if holder_path else self
+            value = saved[path]
+            if path in UPDATED_IN_PLACE:
+                getattr(holder, name)[:] = value
             else:
-                setattr(of, name, value.copy() if value.ndim else value.item())
-        manager, blocks = self.manager, self.blocks
-        blocks.remove(np.flatnonzero(blocks.gone).tolist())
-        places = (saved[path] for path in PLACES)
-        manager.contacts = Contacts(manager.outlines, *places, blocks.motion)
-        self.joints.restore(saved, manager.law, manager.keys)
+                setattr(holder, name, value.copy() if value.ndim else value.item())
+        manager = self.manager
+        blocks = self.blocks
+        blocks.remove(np.flatnonzero(blocks.is_removed).tolist())
+        corner, edge = (saved[path] for path in CONTACT_ROWS)
+        manager.contacts = Contacts(manager.outlines, corner, edge, blocks.motion)
+        self.joints.restore(saved, manager.law, manager.edge_pairs)
         if step:
-            self._change_step(step)
-            self.limit.look(self.scene, blocks, self.contacts, self.joints)
-            self.limit.require(step)
+            self._change_time_step(step)
+            self.limit.update(self.scene, blocks, self.contacts, self.joints)
+            self.limit.require_stable(step)
         self.bind()
 
-    def save(self, folder: Path, saved: Saved | None = None) -> None:
-        """Write a state (default: now) and its scene to a folder; what else is there stays.
+    def save(self, folder: Path, saved: SavedState | None = None) -> None:
+        """Write a state (default: the present one) and its scene into a folder; its other files
+        stay.
 
-        Raises ValueError for a scene that was changed or made in memory. A state in
-        memory needs no text: `Simulation(scene, saved=sim.state())`.
+        Raises ValueError for a scene that was changed or made in memory. A state in memory needs no
+        text: `Simulation(scene, saved=sim.state())`.
         """
         require_text(self.scene)
-        scene, buffer, files = self.scene.text, io.BytesIO(), json.dumps(self.scene.files)
-        np.savez(buffer, version=VERSION, scene=scene, files=files, **(saved or self.state()))
+        buffer = io.BytesIO()
+        np.savez(
+            buffer,
+            version=VERSION,
+            scene=self.scene.text,
+            files=json.dumps(self.scene.files),
+            **(saved or self.state()),
+        )
         write_files(folder, {FILE: buffer.getvalue()})
 
     @classmethod
@@ -330,23 +461,15 @@ class Simulation:
 
         Raises ValueError if the file is missing, damaged or of another version.
         """
-        places = (Path(folder) / part / FILE for part in ("", "state", "refused"))
+        places = [Path(folder) / part / FILE for part in ("", "state", "refused")]
         file = next((place for place in places if place.is_file()), None)
         if not file:
             raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
         try:
-            # a ZIP file: it checks its sums; opened here, for numpy leaves a damaged one open
-            with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
-                data = {name: stored[name] for name in stored.files}
-            if (version := int(data["version"])) == VERSION:
-                scene = parse(
-                    str(data["scene"]), str(file), Files(known=json.loads(str(data["files"])))
-                )
-                joints = [f"{part}-{i}" for part in PARTS for i in range(len(scene.laws))]
-                saved = {name: data[name] for name in (*STATE, *PLACES, "touch", *joints)}
+            version, scene, saved = _read_state(file)
         except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
             raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
-        if version != VERSION:
+        if scene is None:
             raise ValueError(
                 f"{file} has version {version}, this demo reads {VERSION}: go on with the version "
                 "of the demo that wrote it, or run the scene again"
@@ -354,8 +477,23 @@ class Simulation:
         return cls(scene, step, saved)
 
 
+def _read_state(file: Path) -> tuple[int, Scene | None, SavedState]:
+    """Version, scene and state of a file; no scene for another version than `VERSION`."""
+    # ZIP files have checksums. Opened here, because numpy leaves a damaged file open.
+    with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
+        data = {name: stored[name] for name in stored.files}
+    version = int(data["version"])
+    if version != VERSION:
+        return version, None, {}
+    files = Files(known=json.loads(str(data["files"])))
+    scene = parse(str(data["scene"]), str(file), files)
+    joints = [f"{part}-{i}" for part in STATE_PARTS for i in range(len(scene.laws))]
+    names = (*STATE, *CONTACT_ROWS, "first_touch", *joints)
+    return version, scene, {name: data[name] for name in names}
+
+
 def require_text(scene: Scene) -> None:
-    """Refuse a scene without a text. Raises ValueError."""
+    """Raise ValueError for a scene without a text, from which no file can continue."""
     if not scene.text:
         raise ValueError(
             "the scene was made or changed in memory, so it has no text to go on from: write the "

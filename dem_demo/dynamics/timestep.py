@@ -1,11 +1,11 @@
-"""Largest stable time step: the eigenvalues of the scene's assembled stiffness and dashpots.
-
-Each block alone gives a bound, which is cheap: the eigenvalues of the whole are worked out only
-where the bound does not do, or falls.
+"""Largest stable time step, from the eigenvalues of the assembled stiffness and dashpots.
 
 Symplectic Euler with dashpots that lag by half a step is stable while the largest eigenvalue of
-dt^2 K + 2 dt C against the mass matrix stays below 4. For one oscillator that is
-dt < (2/omega)(sqrt(1 + zeta^2) - zeta). Rocking is in K because every contact is, at its place.
+dt^2 K + 2 dt C, relative to the mass matrix, stays below 4. For one oscillator that is
+dt < (2/omega)(sqrt(1 + zeta^2) - zeta). K holds every contact at its place, so rocking is included.
+
+Each block alone gives a bound that is cheap to compute. The eigenvalues of the whole scene are
+computed only where the bound does not suffice, or falls.
 """
 
 from contextlib import suppress
@@ -19,139 +19,176 @@ from ..contact import Contacts, Joints, Outlines
 from ..scene import Scene, SceneError
 from .blocks import Blocks
 
-DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one
-HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
-SAFE = 0.98  # largest time step as a share of the limit
-FALLEN = 0.95  # share of the lowest bound below which the limit is worked out anew
+MAX_FRACTION_OF_LIMIT = 0.98  # largest time step, relative to the limit
+MAX_STIFFNESS_GROWTH = 1.25  # of a joint between two checks of the time step
+RECOMPUTE_BELOW = 0.95  # of the lowest bound: the eigenvalues of the scene are computed again
+MIN_STIFFNESS = 0.2  # of the stiffest joint: a joint that barely touches counts as this stiff
+MIN_AREA = 0.02  # of the largest joint: the same for its area; else each touch would be checked
+MAX_DENSE_SIZE = 24  # degrees of freedom up to which a dense eigenproblem is faster
+MAX_EIGENPROBLEMS = 40
+STEP_TOLERANCE = 1e-6  # relative change of the step that ends its iteration
 
 
-class StepLimit:
+class TimeStepLimit:
     """Largest stable time step.
 
-    current: a lower bound of it (s); bound: the lowest bound (s) at which it was computed from all
-    eigenvalues; lowest: the lowest value (s) so computed; checked_stiffness (k,): stiffness times
-    area (N/m) of the contacts up to which the present time step is stable.
+    current: a lower bound of it (s); lowest_bound: the lowest bound (s) of single blocks at which
+    it was computed from all eigenvalues; lowest: the lowest value (s) so computed;
+    checked_stiffness (k,): stiffness times area (N/m) of the contacts up to which the present time
+    step is stable.
     """
 
     def __init__(self) -> None:
-        self.current = self.lowest = self.bound = np.inf
+        self.current = np.inf
+        self.lowest = np.inf
+        self.lowest_bound = np.inf
         self.checked_stiffness = np.zeros(0)
 
-    def look(
+    def update(
         self, scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints, dt: float = np.inf
     ) -> None:
-        """Find the limit of a moment from stiffness, dashpots and lever arms, or a bound of it that
-        is good enough for a step dt (s)."""
+        """Find the present limit from stiffness, dashpots and lever arms.
+
+        dt (s): the present time step; a bound that allows it is sufficient.
+        """
         stiffness = np.maximum(
-            joints.stiffness, joints.virgin("stiffness", "closure", contacts.closure)
+            joints.stiffness, joints.interpolate("stiffness", "closure", contacts.closure)
         )
-        # Joints that barely touch count as touching well, or each touch would ask again.
+        stiffness = np.maximum(stiffness, MIN_STIFFNESS * stiffness.max(initial=0.0))
         area = contacts.length * scene.thickness
-        stiffness = np.maximum(stiffness, 0.2 * stiffness.max(initial=0.0))
-        stiffness = stiffness * np.maximum(area, 0.02 * area.max(initial=0.0))
-        run, critical = scene.run, blocks.damping(contacts, stiffness)
-        share = max(run.dashpot_normal, run.dashpot_shear)
+        stiffness = stiffness * np.maximum(area, MIN_AREA * area.max(initial=0.0))
         self.checked_stiffness = stiffness
-        self.current = bound_of_blocks(blocks, contacts, stiffness, share * critical)
-        if dt <= SAFE * self.current and self.current > FALLEN * self.bound:
+        run = scene.run
+        critical = blocks.critical_damping(contacts, stiffness)
+        larger_fraction = max(run.dashpot_normal, run.dashpot_shear)
+        self.current = bound_of_blocks(blocks, contacts, stiffness, larger_fraction * critical)
+        is_allowed = dt <= MAX_FRACTION_OF_LIMIT * self.current
+        if is_allowed and self.current > RECOMPUTE_BELOW * self.lowest_bound:
             return
-        self.bound = min(self.bound, self.current)
+        self.lowest_bound = min(self.lowest_bound, self.current)
         dashpots = np.concatenate([run.dashpot_normal * critical, run.dashpot_shear * critical])
-        self.current = largest_step(rates(blocks, contacts), np.tile(stiffness, 2), dashpots)
+        self.current = largest_step(
+            opening_and_sliding_rates(blocks, contacts), np.tile(stiffness, 2), dashpots
+        )
         self.lowest = min(self.lowest, self.current)
 
-    def require(self, dt: float) -> None:
-        """Refuse a time step (s) beyond the limit; else note how far joints may stiffen.
+    def require_stable(self, dt: float) -> None:
+        """Raise SceneError for a time step (s) beyond the limit; else set `checked_stiffness`.
 
         The limit falls at most as the square root of the largest growth of any joint's stiffness.
         """
-        if dt > SAFE * self.current:
+        allowed = MAX_FRACTION_OF_LIMIT * self.current
+        if dt > allowed:
             raise SceneError(
-                f"time step {dt:.3g} s: must stay below {SAFE} of the limit, which has fallen "
-                f"to {self.current:.3g} s as the joints closed; resume with a smaller step"
+                f"time step {dt:.3g} s: must stay below {MAX_FRACTION_OF_LIMIT} of the limit, "
+                f"which has fallen to {self.current:.3g} s as the joints closed; resume with a "
+                "smaller step"
             )
-        self.checked_stiffness = (
-            min(HEADROOM, (SAFE * self.current / dt) ** 2) * self.checked_stiffness
-        )
+        growth = min(MAX_STIFFNESS_GROWTH, (allowed / dt) ** 2)
+        self.checked_stiffness = growth * self.checked_stiffness
 
 
-def _largest(sums: np.ndarray, root: np.ndarray) -> float:
-    """Largest eigenvalue of any block (n,) alone, on springs that hold it in all directions.
+def _spring_sums(block: np.ndarray, at: np.ndarray, springs: np.ndarray, n: int) -> np.ndarray:
+    """Sums (4, n) of springs on blocks: of stiffness, and of it times x, y and x^2 + y^2.
 
-    sums (4, n): of stiffness, and of it times x, y and x^2 + y^2 from the centroid; root (n, 3):
-    1/sqrt(inertia) of the free motions, else 0.
+    block (k,): numbers; at (k,): places relative to the centroids, complex, m; springs (k,).
     """
-    k, kx, ky, turning = sums
-    none = np.zeros_like(k)
-    K = np.array([[k, none, -ky], [none, k, kx], [-ky, kx, turning]]).transpose(2, 0, 1)
-    # Of a block it is at most the trace, and at least each number on the diagonal: few can have it.
-    diagonal = np.stack([k, k, turning], axis=1) * root**2
-    few = diagonal.sum(axis=1) >= (1 - 1e-9) * diagonal.max(initial=0.0)
-    K, root = K[few], root[few]
-    return float(np.linalg.eigvalsh(K * root[:, :, None] * root[:, None, :]).max(initial=0.0))
-
-
-def _held(block: np.ndarray, at: np.ndarray, each: np.ndarray, n: int) -> np.ndarray:
-    """Sums (4, n), for `_largest`, of springs `each` at complex places from centroids of blocks."""
-    parts = each, each * at.real, each * at.imag, each * np.abs(at) ** 2
+    parts = springs, springs * at.real, springs * at.imag, springs * np.abs(at) ** 2
     return np.array([np.bincount(block, part, n) for part in parts])
 
 
-def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> float:
-    """Lower bound (s) of the largest stable step for springs (k,) in N/m and dashpots (k,) in N s/m
-    that act alike along normal and tangent; inf without springs.
+def _largest_eigenvalue(sums: np.ndarray, inverse_sqrt_inertia: np.ndarray) -> float:
+    """Largest eigenvalue of any single block (n,) on springs that act in all directions.
 
-    A spring between two blocks that give way stores at most twice what each alone would store in
-    it, so the largest eigenvalue is at most that of the worst block on springs twice as stiff.
+    sums (4, n): of `_spring_sums`; inverse_sqrt_inertia (n, 3): zero for motions that are not free.
     """
-    free, n = blocks.free.any(axis=1), len(blocks.free)
-    both = 1.0 + (free[contacts.a] & free[contacts.b])
-    sides, centre = (contacts.a, contacts.b), blocks.motion[0] + 1j * blocks.motion[1]
-    k, c = (
-        _largest(sum(_held(x, contacts.at - centre[x], both * part, n) for x in sides), blocks.root)
-        for part in (stiffness, dashpot)
-    )
+    k, kx, ky, k_rotation = sums
+    zero = np.zeros_like(k)
+    K = np.array([[k, zero, -ky], [zero, k, kx], [-ky, kx, k_rotation]]).transpose(2, 0, 1)
+    # The largest eigenvalue of a block is at most its trace, and at least its largest diagonal
+    # entry. Few blocks can have the largest of all.
+    root = inverse_sqrt_inertia
+    diagonal = np.stack([k, k, k_rotation], axis=1) * root**2
+    can_be_largest = diagonal.sum(axis=1) >= (1 - 1e-9) * diagonal.max(initial=0.0)
+    K = K[can_be_largest]
+    root = root[can_be_largest]
+    return float(np.linalg.eigvalsh(K * root[:, :, None] * root[:, None, :]).max(initial=0.0))
+
+
+def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> float:
+    """Lower bound (s) of the largest stable step; infinite without springs.
+
+    stiffness (k,) in N/m and dashpot (k,) in N s/m act along normal and tangent alike. A spring
+    between two movable blocks stores at most twice the energy that each alone would store in it, so
+    the largest eigenvalue is at most the one of the worst block on springs twice as stiff.
+    """
+    n = len(blocks.is_free)
+    is_movable = blocks.is_free.any(axis=1)
+    weight = 1.0 + (is_movable[contacts.block_a] & is_movable[contacts.block_b])
+    centroid = blocks.motion[0] + 1j * blocks.motion[1]
+
+    def largest(springs: np.ndarray) -> float:
+        sums = sum(
+            _spring_sums(block, contacts.position - centroid[block], weight * springs, n)
+            for block in (contacts.block_a, contacts.block_b)
+        )
+        return _largest_eigenvalue(sums, blocks.inverse_sqrt_inertia)
+
+    k = largest(stiffness)
+    c = largest(dashpot)
     return 4 / (c + np.sqrt(c * c + 4 * k)) if k else np.inf
 
 
-def rates(blocks: Blocks, contacts: Contacts) -> csr_array:
-    """(2 k, free motions): opening rates along normal and tangent of unit-mass motions."""
-    k, block = len(contacts.closure), np.concatenate([contacts.a, contacts.b])
-    arm = np.tile(contacts.at, 2) - (blocks.motion[0] + 1j * blocks.motion[1])[block]
-    way = np.repeat([-1.0, 1.0], k) * np.tile([contacts.normal, -1j * contacts.normal], 2)
-    parts = np.stack([way.real, way.imag, (arm.conj() * way).imag], axis=2) * blocks.root[block]
+def opening_and_sliding_rates(blocks: Blocks, contacts: Contacts) -> csr_array:
+    """Matrix (2 k, free motions) from motions of the blocks to the rates of the contacts.
+
+    Opening rates (k,) along the normal, then sliding rates (k,), for motions that are scaled by the
+    square root of their inertia.
+    """
+    k = len(contacts.closure)
+    block = np.concatenate([contacts.block_a, contacts.block_b])
+    arm = np.tile(contacts.position, 2) - (blocks.motion[0] + 1j * blocks.motion[1])[block]
+    directions = np.tile([contacts.normal, -1j * contacts.normal], 2)
+    way = np.repeat([-1.0, 1.0], k) * directions
+    rotation = (arm.conj() * way).imag
+    entries = np.stack([way.real, way.imag, rotation], axis=2) * blocks.inverse_sqrt_inertia[block]
     row = np.tile(np.arange(2 * k).reshape(2, k), 2)[:, :, None]
-    places = np.broadcast_arrays(row, 3 * block[:, None] + np.arange(3))
-    entries = parts.ravel(), tuple(place.ravel() for place in places)
-    return csr_array(entries, shape=(2 * k, blocks.free.size))[:, blocks.free.ravel()]
+    column = 3 * block[:, None] + np.arange(3)
+    places = tuple(place.ravel() for place in np.broadcast_arrays(row, column))
+    matrix = csr_array((entries.ravel(), places), shape=(2 * k, blocks.is_free.size))
+    return matrix[:, blocks.is_free.ravel()]
 
 
 def largest_step(rates: csr_array, stiffness: np.ndarray, dashpot: np.ndarray) -> float:
-    """Largest stable step (s) for K (2 k,) in N/m and C (2 k,) in N s/m; inf without K.
+    """Largest stable step (s); infinite without stiffness.
 
-    The largest eigenvalue of dt^2 K + 2 dt C must be 4. Any vector gives too long a step, the
-    eigenvector of the step before a better one: two or three eigenproblems in all.
+    rates (2 k, m): of `opening_and_sliding_rates`; stiffness (2 k,) in N/m; dashpot (2 k,) in N
+    s/m. The largest eigenvalue of dt^2 K + 2 dt C must be 4. Any vector gives a step that is too
+    long, the eigenvector of the step before a better one: two or three eigenproblems suffice.
     """
     if 0 in rates.shape or not stiffness.any():
         return np.inf
-    K, C = ((rates.T @ (diags(part) @ rates)).tocsc() for part in (stiffness, dashpot))
-    step, last = np.inf, np.inf
-    vector = _top(K)
-    for _ in range(40):
-        k, c = vector @ (K @ vector), vector @ (C @ vector)
+    K = (rates.T @ (diags(stiffness) @ rates)).tocsc()
+    C = (rates.T @ (diags(dashpot) @ rates)).tocsc()
+    step = np.inf
+    vector = _top_eigenvector(K)
+    for _ in range(MAX_EIGENPROBLEMS):
+        k = vector @ (K @ vector)
+        c = vector @ (C @ vector)
         if not k + c > 0:
             return np.inf  # contacts between driven and fixed blocks only
-        step, last = 4 / (c + np.sqrt(c * c + 4 * k)), step
-        if last - step < 1e-6 * step:
+        previous_step = step
+        step = 4 / (c + np.sqrt(c * c + 4 * k))
+        if previous_step - step < STEP_TOLERANCE * step:
             break
-        vector = _top(step**2 * K + 2 * step * C)
+        vector = _top_eigenvector(step**2 * K + 2 * step * C)
     return float(step)
 
 
-def _top(matrix: csc_array) -> np.ndarray:
-    """Eigenvector (unit length) of the largest eigenvalue."""
+def _top_eigenvector(matrix: csc_array) -> np.ndarray:
+    """Unit eigenvector of the largest eigenvalue of a symmetric matrix."""
     size = matrix.shape[0]
-    if size > DENSE:
+    if size > MAX_DENSE_SIZE:
         start = np.random.default_rng(0).standard_normal(size)
         with suppress(ArpackNoConvergence):
             return eigsh(matrix, k=1, v0=start, tol=1e-4)[1][:, 0]
@@ -159,14 +196,17 @@ def _top(matrix: csc_array) -> np.ndarray:
 
 
 def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: float) -> float:
-    """Step limit (s) with every block touched along its whole outline at `stiffness` (Pa/m); inf
-    where forces move none.
+    """Step limit (s) if every block were touched along its whole outline; infinite where forces
+    move no block.
 
-    Half of every edge acts at either end, or half a corner length if that is more. Twice as stiff,
-    as in `bound_of_blocks`, for any contacts between them.
+    stiffness (Pa/m): of the joints. Half of every edge acts at either end, or half a corner length
+    if that is larger; twice as stiff, as in `bound_of_blocks`, for any contacts between blocks.
     """
-    o, n = outlines, len(blocks.free)
-    each = stiffness * scene.thickness * np.maximum(o.side, o.corner_length)  # twice a half
-    ends = np.arange(len(o.block)), o.after
-    largest = _largest(sum(_held(o.block, o.local[c], each, n) for c in ends), blocks.root)
+    length = np.maximum(outlines.edge_length, outlines.corner_length)
+    springs = stiffness * scene.thickness * length  # twice a half
+    sums = sum(
+        _spring_sums(outlines.block, outlines.local_corner[end], springs, len(blocks.is_free))
+        for end in (np.arange(len(outlines.block)), outlines.next)
+    )
+    largest = _largest_eigenvalue(sums, blocks.inverse_sqrt_inertia)
     return 2 / np.sqrt(largest) if largest else np.inf

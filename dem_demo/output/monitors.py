@@ -68,7 +68,7 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
     along = np.roll(corners, -1, axis=0) - corners
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
     face = int(((sim.blocks.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
-    return sim.manager.outlines.start[block] + face, outward[face]
+    return sim.manager.outlines.first_corner[block] + face, outward[face]
 
 
 def readings(sim: Simulation) -> dict[str, float]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..dynamics.energy_balance import COLUMNS
+from ..dynamics.energy_balance import ENERGIES
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, median_size
 from .monitors import base_of, law_between, readings, watched_slips
@@ -39,7 +39,7 @@ class Record:
     def take(self, sim: Simulation) -> None:
         """Add the present as a frame."""
         self.times.append(sim.time)
-        self.motion.append(np.where(sim.blocks.gone, np.nan, sim.blocks.motion))
+        self.motion.append(np.where(sim.blocks.is_removed, np.nan, sim.blocks.motion))
         self.energy.append([*sim.energy_balance.energy.tolist(), sim.energy_balance.error])
         self.joints.append(_joints(sim))
         self.stresses.append(block_stresses(sim))
@@ -62,7 +62,7 @@ class Record:
 
     def write(self, path: Path) -> None:
         """history.csv: times, energies and what the scene's [monitor] asks for."""
-        header = ["time_s", *(f"{c}_J" for c in COLUMNS), "energy_error", *self.monitored[0]]
+        header = ["time_s", *(f"{c}_J" for c in ENERGIES), "energy_error", *self.monitored[0]]
         rows = zip(self.times, self.energy, self.monitored, strict=True)
         write_csv(path, header, ([t, *e, *w.values()] for t, e, w in rows))
 
@@ -98,16 +98,16 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
     c, joints = sim.contacts, sim.joints
     # The segment: what each side of the corner carries of it, the rest half and half.
-    part = c.carried + 0.5 * (c.length - c.carried.sum(axis=0))
+    part = c.overlap_length + 0.5 * (c.length - c.overlap_length.sum(axis=0))
     ahead = part[0] / np.maximum(part.sum(axis=0), 1e-300)
-    ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * c.way
+    ends = c.position + np.stack([ahead, ahead - 1], axis=0) * c.length * c.edge_direction
     ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
     columns = {
-        "who": np.column_stack([c.a, c.b]), "ends": ends, "law": sim.manager.law,
+        "who": np.column_stack([c.block_a, c.block_b]), "ends": ends, "law": sim.manager.law,
         "closure_m": c.closure, "shear_m": joints.delta[:, 1],
         "normal_stress_Pa": joints.traction[:, 0], "shear_stress_Pa": joints.traction[:, 1],
         "sliding": joints.sliding, "slipping": joints.slipping, "separated": joints.separated,
-        "length_m": c.length, "sliding_m/s": c.sliding,
+        "length_m": c.length, "sliding_m/s": c.sliding_rate,
     }  # fmt: skip
     return {name: column[c.length > 0] for name, column in columns.items()}
 
@@ -117,9 +117,9 @@ def block_stresses(sim: Simulation) -> np.ndarray:
     its joints, over its volume. NaN where other forces hold or load a block."""
     c, blocks = sim.contacts, sim.scene.blocks
     push, shear = (sim.joints.traction * c.length[:, None]).T
-    on_b, block = (push + 1j * shear) * c.normal, np.concatenate([c.a, c.b])
+    on_b, block = (push + 1j * shear) * c.normal, np.concatenate([c.block_a, c.block_b])
     fx, fy = (part := np.concatenate([on_b, -on_b])).real, part.imag
-    arm = np.tile(c.at, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
+    arm = np.tile(c.position, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
     parts = fx * arm.real, fy * arm.imag, 0.5 * (fx * arm.imag + fy * arm.real)
     sums = np.array([np.bincount(block, part, len(blocks)) for part in parts])
     other = np.array([block.fixed or bool(block.prescribed) for block in blocks])

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from jointlaw.support.files import write_json
 from jointlaw.support.pyplot import FORMATS
 
-from ..dynamics.energy_balance import COLUMNS
+from ..dynamics.energy_balance import ENERGIES
 from ..dynamics.simulation import Simulation, require_text
 from ..scene import Scene, SceneError, median_size
 from .folder import BLOCKS, HISTORY, clear_run
@@ -63,7 +63,7 @@ def run(
         "stages_begun_s": [
             time if time < np.inf else None for time in sim.stage_start_times.tolist()
         ],
-        "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
+        "energy_J": dict(zip(ENERGIES, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
         "largest_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),
         "slip": list(record.slips.values()),

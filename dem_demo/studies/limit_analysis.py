@@ -20,7 +20,7 @@ import jointlaw as jl
 
 from ..contact import ContactManager, Contacts
 from ..dynamics.blocks import Blocks, apply_loads
-from ..dynamics.timestep import rates
+from ..dynamics.timestep import opening_and_sliding_rates
 from ..output.monitors import slip_distance
 from ..scene import Law, Scene
 
@@ -60,15 +60,15 @@ def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBala
     """The balance of a scene as drawn, without the equations of `excluded` blocks (blocks,)."""
     blocks = Blocks(scene)
     manager = ContactManager(scene, blocks.motion)
-    manager.renew(blocks.motion, blocks.near())
+    manager.rebuild(blocks.motion, blocks.neighbour_pairs())
     apply_loads(scene, blocks, manager)
     contacts: Contacts = manager.contacts
     bearing = np.flatnonzero(contacts.length > 1e-9 * contacts.length.max(initial=0.0))
     count = len(contacts.length)
-    motions = rates(blocks, contacts).T.tocsr()  # (free motions, 2 contacts)
-    load = ((blocks.gravity + blocks.loads) * blocks.root)[blocks.free]
+    motions = opening_and_sliding_rates(blocks, contacts).T.tocsr()  # (free motions, 2 contacts)
+    load = ((blocks.gravity + blocks.loads) * blocks.inverse_sqrt_inertia)[blocks.is_free]
     if excluded is not None:
-        block_of_motion = np.nonzero(blocks.free)[0]
+        block_of_motion = np.nonzero(blocks.is_free)[0]
         kept = ~excluded[block_of_motion]
         motions, load = motions[kept], load[kept]
     stress = overburden_stress(scene)

@@ -20,7 +20,7 @@ from tqdm import tqdm
 import jointlaw as jl
 from jointlaw.support.files import write_json
 
-from ..dynamics.equilibrium import displacements
+from ..dynamics.equilibrium import equilibrium_displacements
 from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
 from ..output.record import named, told
@@ -223,7 +223,7 @@ def _march(
 
         def found(x: float, last: float | None, guess: np.ndarray | None) -> np.ndarray | None:
             moved = trials.ask(
-                f"{name} {x} from {last}", lambda: displacements(at(x), guess, loose)
+                f"{name} {x} from {last}", lambda: equilibrium_displacements(at(x), guess, loose)
             )
             bar.update()
             return None if moved is None else np.array(moved)

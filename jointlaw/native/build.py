@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -181,15 +181,15 @@ def write_headers(folder: Path = BUILT) -> None:
     (folder / "jointlaw.h").write_text(layout.jointlaw_h(), encoding="utf-8")
 
 
-def library_name(system: str) -> str:
-    """File name of the library on an operating system of `SUFFIXES`."""
-    return f"libjointlaw.{SUFFIXES[system]}"
+def library_name(system: str, stem: str = "libjointlaw") -> str:
+    """File name of a library on an operating system of `SUFFIXES`."""
+    return f"{stem}.{SUFFIXES[system]}"
 
 
 class Unit(NamedTuple):
-    """A translation unit of the library: source file, vector width, macros."""
+    """A translation unit of a library: source file, vector width, macros."""
 
-    source: str
+    source: Path
     lanes: int
     macros: tuple[str, ...] = ()
 
@@ -199,14 +199,14 @@ def translation_units(levels: Iterable[int]) -> list[Unit]:
     baseline = min(LEVELS)
     identity = (f"-DJLAW_LEVELS={sum(levels)}", f'-DJLAW_SOURCES="{hash_sources()}"')
     units = [
-        Unit("library.c", baseline, identity),
-        Unit("processor.c", baseline),
-        Unit("blocks.c", baseline),
+        Unit(HERE / "library.c", baseline, identity),
+        Unit(HERE / "processor.c", baseline),
     ]
+    batch = HERE / "batch.c"
     for lanes in levels:
         contiguous = ("-DJL_W=4", f"-DKIND=_{lanes}_contiguous", "-DJLAW_FACET_VECTORS")
-        units.append(Unit("batch.c", lanes, (f"-DJL_W={lanes}", f"-DKIND=_{lanes}")))
-        units.append(Unit("batch.c", lanes, contiguous))
+        units.append(Unit(batch, lanes, (f"-DJL_W={lanes}", f"-DKIND=_{lanes}")))
+        units.append(Unit(batch, lanes, contiguous))
     return units
 
 
@@ -217,13 +217,21 @@ def build(compiler: Compiler, folder: Path = BUILT) -> Path:
     """
     units = translation_units(select_levels(compiler))
     write_headers(folder)
-    library = folder / library_name(compiler.machine[1])
+    return build_library(compiler, units, folder / library_name(compiler.machine[1]))
+
+
+def build_library(compiler: Compiler, units: Sequence[Unit], library: Path) -> Path:
+    """Compile the units in parallel, link them to a library, and return its path.
+
+    Generated headers are included from the folder of the library. Raises RuntimeError with the
+    messages of the compiler if it fails.
+    """
     with tempfile.TemporaryDirectory() as scratch:
         objects = [Path(scratch) / f"{i}.o" for i in range(len(units))]
 
         def compile_unit(unit: Unit, object_file: Path) -> None:
-            flags = [*compiler.flags(unit.lanes), *unit.macros, f"-I{folder}"]
-            compiler.run(*flags, "-c", HERE / unit.source, "-o", object_file)
+            flags = [*compiler.flags(unit.lanes), *unit.macros, f"-I{library.parent}"]
+            compiler.run(*flags, "-c", unit.source, "-o", object_file)
 
         with ThreadPoolExecutor() as pool:
             list(pool.map(compile_unit, units, objects))

@@ -233,13 +233,13 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
 def test_history_survives_a_gap():
     """A joint that opens for less than the reach of the search is the same joint afterwards."""
     sim = Simulation(parse(SHORT.replace("velocity = [0.0, 0.1]", "velocity = [0.0, 0.3]")))
-    keys, places = sim.manager.keys, sim.joints.place.copy()
+    keys, places = sim.manager.edge_pairs, sim.joints.place.copy()
     opened = False
     for _ in range(600):
         sim.step()
         opened |= bool((sim.joints.traction[sim.manager.between(1, 2), 0] == 0).all())
     assert opened
-    assert sim.manager.keys is keys  # the list of contacts never changed
+    assert sim.manager.edge_pairs is keys  # the list of contacts never changed
     assert (sim.joints.place == places).all()
 
 
@@ -251,7 +251,7 @@ def test_what_meets_in_a_run_has_no_bond():
     sim = Simulation(parse(f"[laws.rock]\n{ROCK}{BOND}{BASE}{ONE}[run]\nend = 0.1\n"))
     for started, held in ((False, -1e3), (True, 0.0)):
         new = np.full(sim.joints.n, -1)
-        sim.joints.rearrange(new, sim.manager.law, sim.manager.keys, started)
+        sim.joints.rearrange(new, sim.manager.law, sim.manager.edge_pairs, started)
         F, _, _ = sim.joints.trial(np.tile([-1e-6, 0.0], (sim.joints.n, 1)))
         assert F[:, 0] == pytest.approx(held)
 
@@ -363,7 +363,7 @@ def test_resume_is_bit_identical(tmp_path, damage):
         "limit.lowest",
     ):
         np.testing.assert_equal(*(attrgetter(name)(sim) for sim in (again, whole)))
-    batch = again.joints.by_law[again.joints.law_names.index("rock/rough")].batch
+    batch = again.joints.by_law[again.joints.law_names.index("rock/rough")].pool.batch
     assert bool(damage) == (batch.plastic_work.max() > 0.0)
     # also the one that goes on tells how far blocks have moved since step 0
     np.testing.assert_array_equal(Record(again).moved, Record(whole).moved)
@@ -382,7 +382,10 @@ def test_a_damaged_file_or_another_version_is_refused(tmp_path):
         (lambda: file.write_bytes(b""), damaged),
         (lambda: file.write_bytes(whole[:2000] + bytes([whole[2000] ^ 1]) + whole[2001:]), damaged),
         (lambda: np.savez(file, **lacking), damaged),
-        (lambda: np.savez(file, **{**arrays, "version": 3}), "version 3, this demo reads 9: go on"),
+        (
+            lambda: np.savez(file, **{**arrays, "version": 3}),
+            "version 3, this demo reads 10: go on",
+        ),
         (file.unlink, r"holds no saved state: state\.npz is missing"),
     ):
         write()

@@ -158,7 +158,7 @@ def test_joints_have_the_law_of_their_set():
     )
     block = [Polygon(one.corners).contains(Point(-3.0, 7.0)) for one in scene.blocks].index(True)
     manager = ContactManager(scene, Blocks(scene).motion)
-    start, of = manager.outlines.start, manager.outlines.block
+    start, of = manager.outlines.first_corner, manager.outlines.block
     laws = {int(start[one] + edge): law for (one, edge), law in scene.edge_laws.items()}
     pairs = np.array([*itertools.combinations(sorted(laws), 2)])
     found = [[*scene.laws][law] for law in manager.laws_of(pairs)]

@@ -1,154 +1,190 @@
-"""One step of the blocks in numpy, slow and plain: the oracle of `jointlaw/native/blocks.c`."""
+"""One step of the blocks in numpy, slow and plain: the oracle of `dem_demo/native/blocks.c`."""
 
 import numpy as np
 
-FACE, CORNER = 2.0, 5.0  # degrees: up to the first an edge lies on another, from the second not
-TIE, EVEN = 1e-9, 1e-10  # sine of an angle, and m, up to which two are the same but for rounding
-LEVEL = 1e-6  # sine of a tilt that is none, for corners past the limit of their range
-_LOW, _HIGH = np.sin(np.radians([FACE, CORNER]))
-_AHEAD = np.array([[1.0], [-1.0]])  # the sides of a corner: towards the edge's end, and its start
+FACE_TILT = 2.0  # degrees: up to this tilt an edge lies on another
+CORNER_TILT = 5.0  # degrees: from this tilt on only its corner touches
+PARALLEL_SINE = 1e-9  # sine of an angle that differs from 0 by rounding only
+MIN_OVERLAP = 1e-10  # m: shorter overlaps are rounding
+LEVEL_SINE = 1e-6  # least sine of a tilt, for corners beyond the limit of their range
+_FACE_SINE = np.sin(np.radians(FACE_TILT))
+_CORNER_SINE = np.sin(np.radians(CORNER_TILT))
+_AHEAD = np.array([[1.0], [-1.0]])  # sides of a corner: towards the edge's end, and its start
 _END = np.array([[1.0], [0.0]])
 
 
 class PlainContacts:
     """k corners on edges at a motion of the blocks, as `dem_demo.contact.geometry.Contacts`.
 
-    Dividing by the direction of an edge takes all into its frame.
+    Vectors are complex; division by the direction of an edge transforms them to its frame.
     """
 
     def __init__(self, outlines, corner, edge, motion) -> None:
         """Corners (k,) on edges (k,) for a motion (6, n) of the blocks."""
-        self.outlines, self.corner, self.edge, o = outlines, corner, edge, outlines
+        self.outlines = o = outlines
+        self.corner = corner
+        self.edge = edge
         turn = np.exp(1j * motion[2])[o.block]
-        place, ways = (motion[0] + 1j * motion[1])[o.block] + turn * o.local, turn * o.way
-        x, y = o.block[corner], o.block[edge]
-        self.a, self.b = np.minimum(x, y), np.maximum(x, y)
-        sign = np.where(x > y, 1.0, -1.0)
-        self.sides = np.stack([o.before[corner], corner])
-        self.behind = np.stack([o.before[edge], o.after[edge]])
-        self.at, way = place[corner], ways[edge]
-        frame = way.conj()
-        here = (self.at - place[edge]) * frame  # in the frame of the edge: its block is on the left
-        side = ways[self.sides] * (-_AHEAD * frame)
-        rest = o.side[edge] * _END - here
-        both = _AHEAD + side
-        mean = both / np.maximum(np.abs(both), 1e-9)
-        self.rise, level = -side.imag, _AHEAD * side.real
-        overlap, pull, twist = _overlaps(rest, o.side[self.sides] * side, mean, o.soft)
-        stood, along = _stood_on(o.corner_length, o.soft, here.real, o.side[edge])
-        self.length, self.carried, pull, twist = _lengths(
-            stood, along, self.rise, level, overlap, pull, twist
+        place = (motion[0] + 1j * motion[1])[o.block] + turn * o.local_corner
+        directions = turn * o.local_direction
+        corner_block = o.block[corner]
+        edge_block = o.block[edge]
+        self.block_a = np.minimum(corner_block, edge_block)
+        self.block_b = np.maximum(corner_block, edge_block)
+        sign = np.where(corner_block > edge_block, 1.0, -1.0)
+        self.sides = np.stack([o.previous[corner], corner])
+        neighbours = np.stack([o.previous[edge], o.next[edge]])
+        self.position = place[corner]
+        direction = directions[edge]
+        frame = direction.conj()
+        # in the frame of the edge, whose block is on its left
+        local = (self.position - place[edge]) * frame
+        side = directions[self.sides] * (-_AHEAD * frame)
+        to_end = o.edge_length[edge] * _END - local
+        bisector = _AHEAD + side
+        mean = bisector / np.maximum(np.abs(bisector), 1e-9)
+        self.tilt_sine = -side.imag
+        tilt_cosine = _AHEAD * side.real
+        whole_side = o.edge_length[self.sides] * side
+        overlap, gradient, rotation = _overlaps(to_end, whole_side, mean, o.transition_length)
+        standing, along = _standing_length(
+            o.corner_length, o.transition_length, local.real, o.edge_length[edge]
         )
-        self.pull, self.twist = sign * pull * way, sign * twist
-        # Behind a corner its edge ends at another corner. Of what follows there, a side of this
-        # corner or the next edge of the other block, the one that is turned less is next; the limit
-        # is where both are equally deep. The raised end of an edge on an edge has its side next.
-        # Drawn joints are parallel but for rounding, which must not choose: they count as parallel.
-        beyond = _AHEAD * o.way[self.behind] / o.way[edge]
-        self.own = (_AHEAD * (side.conj() * beyond).imag <= TIE) | (self.rise[::-1] < -TIE)
-        toward = np.where(self.own, both, _AHEAD + beyond)
-        self.inside = -(rest[::-1] * toward.conj()).real
-        self.inside *= np.where(self.own, np.abs(self.rise) + LEVEL, 1.0)
-        self.normal, self.closure = sign * (-1j * way), here.imag
-        v = _velocity(motion, self.b, self.at) - _velocity(motion, self.a, self.at)
-        v *= self.normal.conj()
-        self.opening, self.sliding = v.real, -v.imag
+        self.length, self.overlap_length, gradient, rotation = _lengths(
+            standing, along, self.tilt_sine, tilt_cosine, overlap, gradient, rotation
+        )
+        self.length_gradient = sign * gradient * direction
+        self.length_per_rotation = sign * rotation
+        # At its limit the range of the corner meets another one: of the next corner, along a side
+        # of this corner, or of the next edge. The one that is rotated less comes next, and the
+        # limit is where both are equally deep. Where a side is raised, its corner comes next. Drawn
+        # joints are parallel but for rounding, which must not decide: they count as parallel.
+        beyond = _AHEAD * o.local_direction[neighbours] / o.local_direction[edge]
+        is_rotated_less = _AHEAD * (side.conj() * beyond).imag <= PARALLEL_SINE
+        self.corner_takes_over = is_rotated_less | (self.tilt_sine[::-1] < -PARALLEL_SINE)
+        toward = np.where(self.corner_takes_over, bisector, _AHEAD + beyond)
+        per_depth = np.where(self.corner_takes_over, np.abs(self.tilt_sine) + LEVEL_SINE, 1.0)
+        self.range_margin = -(to_end[::-1] * toward.conj()).real * per_depth
+        self.normal = sign * (-1j * direction)
+        self.closure = local.imag
+        velocity = _velocity(motion, self.block_b, self.position)
+        velocity = velocity - _velocity(motion, self.block_a, self.position)
+        in_frame = velocity * self.normal.conj()
+        self.opening_rate = in_frame.real
+        self.sliding_rate = -in_frame.imag
 
 
-def _overlaps(rest, whole, mean, soft):
-    """Overlap of each side with the edge (2, k), measured along the mean of both so that the blocks
-    may trade roles; its derivatives by motion of the corner's block relative to the edge's.
+def _overlaps(to_end, whole_side, mean, transition_length):
+    """Overlap of each side with the edge (2, k), and its derivatives by displacement and rotation
+    of the corner's block relative to the edge's block.
 
-    It runs from the corner or from what lies behind it, whichever comes later, to where the edge
-    or the side ends, whichever comes first; within `soft` (m) of a tie the choice is gradual.
+    It is measured along the mean direction of both, so that the blocks may swap roles. It runs from
+    the corner or the start of the edge, whichever comes later, to the end of the edge or of the
+    side, whichever comes first; within the transition length of a tie the choice is gradual.
     """
     along = mean.conj()
-    rest, whole = rest * along, whole * along
-    back = rest[::-1] * (along * mean[::-1])
-    size, slope = _soft_size(rest.real - whole.real, soft)
-    step, rate = _soft_size(back.real, soft)
-    overlap = 0.5 * (rest.real + whole.real - size - back.real - step)
-    by_edge, by_end = 0.5 - 0.5 * slope, -0.5 - 0.5 * rate
-    twist = by_edge * (rest.imag + whole.imag) + by_end * back.imag - whole.imag
-    return overlap, -(by_edge + by_end) * mean, 0.5 * twist
+    remaining = to_end * along
+    whole = whole_side * along
+    back = remaining[::-1] * (along * mean[::-1])
+    end_size, end_slope = _smooth_size(remaining.real - whole.real, transition_length)
+    start_size, start_slope = _smooth_size(back.real, transition_length)
+    overlap = 0.5 * (remaining.real + whole.real - end_size - back.real - start_size)
+    by_end = 0.5 - 0.5 * end_slope
+    by_start = -0.5 - 0.5 * start_slope
+    rotation = by_end * (remaining.imag + whole.imag) + by_start * back.imag - whole.imag
+    return overlap, -(by_end + by_start) * mean, 0.5 * rotation
 
 
-def _stood_on(corner_length, soft, x, whole_edge):
-    """Length of joint (k,) at corners that stand at x on edges: none at the end of an edge, where
-    blocks meet in a point, all of it from `soft` (m) on; and its derivative by x."""
-    reach = np.minimum(soft, 0.5 * whole_edge)
-    left = whole_edge - x
-    part = np.clip(np.minimum(x, left) / reach, 0, 1)
-    slope = np.where(x < left, 1, -1) * 6 * part * (1 - part) / reach
+def _standing_length(corner_length, transition_length, x, edge_length):
+    """Length of joint (k,) at corners that stand at x on edges, and its derivative by x.
+
+    Zero at the ends of an edge, where blocks meet in a point; whole from the transition length on.
+    """
+    width = np.minimum(transition_length, 0.5 * edge_length)
+    to_end = edge_length - x
+    part = np.clip(np.minimum(x, to_end) / width, 0, 1)
+    slope = np.where(x < to_end, 1, -1) * 6 * part * (1 - part) / width
     return corner_length * part * part * (3 - 2 * part), corner_length * slope
 
 
-def _lengths(stood, along, rise, level, overlap, pull, twist):
-    """Length of joint at the corners and that of each side, and the derivatives of the length by
-    motion of the corner's block relative to the edge's."""
-    up = rise > 0
-    gone, bend = _raised(rise, level)
-    held = np.maximum(overlap, 0.0)
-    lies = 0.5 * (1 - gone) * (overlap > EVEN)
-    stands = gone * up
-    length = (lies * held).sum(axis=0) + stood * stands[0] * stands[1]
-    # The tilt of the first side falls as the corner's block turns, that of the second rises.
-    by_tilt = stood * up * stands[::-1] - 0.5 * held * np.sign(rise)
-    twist = (lies * twist - _AHEAD * bend * by_tilt).sum(axis=0)
-    return length, lies * held, (lies * pull).sum(axis=0) + stands.prod(axis=0) * along, twist
+def _lengths(standing, along, tilt_sine, tilt_cosine, overlap, gradient, rotation):
+    """Length of joint at the corners, the part of each side, and derivatives of the length by
+    displacement and rotation of the corner's block."""
+    is_up = tilt_sine > 0
+    raised, slope = _raised_fraction(tilt_sine, tilt_cosine)
+    overlap_length = np.maximum(overlap, 0.0)
+    lies = 0.5 * (1 - raised) * (overlap > MIN_OVERLAP)
+    stands = raised * is_up
+    length = (lies * overlap_length).sum(axis=0) + standing * stands[0] * stands[1]
+    # The tilt of the first side falls as the corner's block rotates, the tilt of the second rises.
+    by_tilt = standing * is_up * stands[::-1] - 0.5 * overlap_length * np.sign(tilt_sine)
+    total_rotation = (lies * rotation - _AHEAD * slope * by_tilt).sum(axis=0)
+    total_gradient = (lies * gradient).sum(axis=0) + stands.prod(axis=0) * along
+    return length, lies * overlap_length, total_gradient, total_rotation
 
 
-def _raised(sine: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """0 for an edge that lies on the other, 1 for one that does not, smooth between; and its
+def _raised_fraction(sine: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """0 for a side that lies on the edge, 1 for one that is raised, smooth between; and its
     derivative by the size of the tilt (1/rad). sine, cosine: of the tilt, any shape."""
-    part = (np.abs(sine) - _LOW) / (_HIGH - _LOW)
+    part = (np.abs(sine) - _FACE_SINE) / (_CORNER_SINE - _FACE_SINE)
     part = np.minimum(np.maximum(part, cosine <= 0), 1.0)
-    return part * part * (3 - 2 * part), 6 / (_HIGH - _LOW) * part * (1 - part) * cosine
+    slope = 6 / (_CORNER_SINE - _FACE_SINE) * part * (1 - part) * cosine
+    return part * part * (3 - 2 * part), slope
 
 
-def _soft_size(x: np.ndarray, soft: float) -> tuple[np.ndarray, np.ndarray]:
-    """|x| and its derivative, without the kink: differs from |x| only within `soft` of 0."""
+def _smooth_size(x: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """|x| and its derivative, without the kink: differs from |x| only within `width` of 0."""
     size = np.abs(x)
-    part = np.minimum(size / soft, 1.0)
+    part = np.minimum(size / width, 1.0)
     return size * part * (2 - part), np.sign(x) * part * (4 - 3 * part)
 
 
-def _velocity(motion, block, at):
+def _velocity(motion, block, position):
+    """Velocities of points of blocks, complex."""
     x, y, _, u, v, spin = motion
-    return (u + 1j * v)[block] + 1j * spin[block] * (at - (x + 1j * y)[block])
+    return (u + 1j * v)[block] + 1j * spin[block] * (position - (x + 1j * y)[block])
 
 
 def plain_step(sim, velocity, dt):
-    """What a step of `sim` makes of the state that it is in, once its joints have been advanced.
+    """Results of a step of `sim`, from its present state, once its joints have been advanced.
 
     velocity (d,): to which the drives bring their blocks within dt (s). Returns forces (3, n, 3):
-    all, dashpots, drives; the energies booked over dt by name; the velocities (3, n) to go on with.
+    total, dashpots, drives; the energies of the step by name; the next velocities (3, n).
     """
-    scene, blocks, contacts, joints = sim.scene, sim.blocks, sim.contacts, sim.joints
-    area, motion = contacts.length * scene.thickness, blocks.motion
-    stress, shear = (area * part for part in joints.traction.T)
-    energy = joints.stored_energy * scene.thickness  # J/m: what a change of the length costs
-    out = np.zeros((3, *blocks.free.shape))
-    critical = blocks.damping(contacts, joints.stiffness * area)
-    least = np.where(joints.damage < 1, -np.inf, -stress)
-    push = np.maximum(-scene.run.dashpot_normal * critical * contacts.opening, least)
+    scene = sim.scene
+    blocks = sim.blocks
+    contacts = sim.contacts
+    joints = sim.joints
+    drives = blocks.drives
+    balance = sim.energy_balance
+    area = contacts.length * scene.thickness
+    motion = blocks.motion
+    push, shear = (area * part for part in joints.traction.T)
+    energy = joints.stored_energy * scene.thickness  # J/m: a change of the length costs this
+    forces = np.zeros((3, *blocks.is_free.shape))
+    total, dashpots, reactions = forces
+    critical = blocks.critical_damping(contacts, joints.stiffness * area)
+    lower_bound = np.where(joints.damage < 1, -np.inf, -push)
+    resistance = -scene.run.dashpot_normal * critical * contacts.opening_rate
+    resistance = np.maximum(resistance, lower_bound)
     stick = np.maximum(1.0 - joints.separated - joints.slipping, 1.0 - joints.damage)
-    resist = -scene.run.dashpot_shear * critical * stick * contacts.sliding
-    damped = contacts.assemble(motion, push, resist)
-    out[1] = damped * blocks.mobile
-    out[0] = contacts.assemble(motion, stress, -shear, energy) + damped
-    out[0] = (out[0] + (blocks.gravity + blocks.loads)) * blocks.mobile
-    driven = blocks.drives.rows, blocks.drives.axes
-    needed = blocks.inertia[driven] * (velocity - motion[3:].T[driven]) / dt - out[0][driven]
-    out[2][driven] = needed
-    out[0][driven] += needed
-    went = motion[3:].T
-    booked = {
-        "kinetic": 0.5 * (went * (blocks.inertia * went + dt * out[0])).sum(),
-        "potential": -dt * (blocks.gravity * went).sum(),
+    drag = -scene.run.dashpot_shear * critical * stick * contacts.sliding_rate
+    damped = contacts.assemble(motion, resistance, drag)
+    dashpots[:] = damped * blocks.is_mobile
+    total[:] = contacts.assemble(motion, push, -shear, energy) + damped
+    total[:] = (total + (blocks.gravity + blocks.loads)) * blocks.is_mobile
+    driven = drives.rows, drives.axes
+    change = velocity - motion[3:].T[driven]
+    needed = blocks.inertia[driven] * change / dt - total[driven]
+    reactions[driven] = needed
+    total[driven] += needed
+    v = motion[3:].T
+    drive_work = 0.5 * dt * ((balance.previous_forces[1] + reactions) * v).sum()
+    energies = {
+        "kinetic": 0.5 * (v * (blocks.inertia * v + dt * total)).sum(),
+        "potential": -dt * (blocks.gravity * v).sum(),
         "stored": area @ joints.stored_energy,
-        "dashpots": -0.5 * dt * ((sim.energy_balance.last[0] + out[1]) * went).sum(),
-        "work": 0.5 * dt * ((sim.energy_balance.last[1] + out[2]) * went).sum()
-        + dt * (blocks.loads * went).sum(),
+        "dashpots": -0.5 * dt * ((balance.previous_forces[0] + dashpots) * v).sum(),
+        "work": drive_work + dt * (blocks.loads * v).sum(),
     }
-    return out, booked, (went + dt * out[0] / blocks.inertia * blocks.mobile).T
+    return forces, energies, (v + dt * total / blocks.inertia * blocks.is_mobile).T

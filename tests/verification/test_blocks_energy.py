@@ -121,7 +121,9 @@ dashpot_shear = 0.0
     )
     sim = Simulation(scene)
     booked = until(
-        sim, scene.run.end, lambda: (sim.energy_balance.value, sim.manager.offset.max(initial=0))
+        sim,
+        scene.run.end,
+        lambda: (sim.energy_balance.value, sim.manager.closure_offset.max(initial=0)),
     )
     dropped, stored, work = np.array([[v["dropped"], v["stored"], v["work"]] for v, _ in booked]).T
     assert stored.max() > 100
@@ -153,25 +155,26 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
     text = on_base(law, [1.0, 1.0], at=at.tolist(), base=(10.0, 1.0), end=10.0, **way)
     text += "settle = false\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nstep = 1e-4\n"
     sim = Simulation(parse(f"{text}law_steps = {steps}"))
-    had, (held,) = collections.Counter(), sim.joints.by_law
-    take = held.take
+    contacts_of_place = collections.Counter()
+    (joints,) = sim.joints.by_law
+    allocate = joints.allocate
 
-    def counted(m):
-        places = take(m)
-        had.update(places.tolist())
+    def count_contacts(m):
+        places = allocate(m)
+        contacts_of_place.update(places.tolist())
         return places
 
     def see():
         # pressed joints, each by its place and how many contacts have had that
         places = sim.joints.place[sim.joints.traction[:, 0] > 0].tolist()
-        pressed = {(place, had[place]) for place in places}
+        pressed = {(place, contacts_of_place[place]) for place in places}
         value = (
             sim.energy_balance.total - sim.energy_balance.start,
             sim.energy_balance.value["potential"],
         )
         return 20.0 - np.degrees(sim.blocks.motion[2, 1]), *value, pressed
 
-    held.take = counted
+    joints.allocate = count_contacts
     *numbers, pressed = zip(*until(sim, 0.72, see), strict=True)
     tilts, total, potential = np.array(numbers)
     in_play = np.ptp(potential)

@@ -3,10 +3,10 @@ the drawing does not matter; and the critical time step, which is sharp: bounded
 diverging at 1.05."""
 
 import contextlib
+import ctypes
 import re
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,11 +14,11 @@ from plain_blocks import PlainContacts, plain_step
 from running import until
 from scene_text import ROCK, block, coulomb, lines, on_base
 
-import jointlaw
 from dem_demo import SceneError, Simulation, load, parse
-from dem_demo.compiled import Pool, World
+from dem_demo.compiled import LawJointArrays, StepArrays
 from dem_demo.contact import tabulate_first_loading
 from dem_demo.dynamics import simulation
+from dem_demo.native import build, layout
 from dem_demo.scene import Files, build_law
 
 PLAIN = coulomb(0.5, 1e9, 1e9)
@@ -30,7 +30,7 @@ def test_critical_damping_is_that_of_the_block_on_all_its_joints():
     stiffness = np.full(sim.joints.n, 1e8)
     critical = 2 * np.sqrt(stiffness.sum() * sim.blocks.inertia[1, 0])
     assert sim.joints.n == 2
-    assert sim.blocks.damping(sim.contacts, stiffness).sum() == pytest.approx(critical)
+    assert sim.blocks.critical_damping(sim.contacts, stiffness).sum() == pytest.approx(critical)
 
 
 # a block that falls on its corner, at tilts at which its lower edge is raised in part
@@ -38,8 +38,19 @@ ROCKING = on_base(coulomb(0.5, 1e9, 8e8), [1.0, 0.5], at=[0.0, 0.279], angle=3.5
 ROCKING += "settle = false\nstep = 1e-4\n"
 # a block that flies up from its seat: dashpots never pull
 FLYING = on_base(PLAIN, [1.0, 0.5], velocity=[0.0, 0.05]) + "step = 1e-4\ndashpot_normal = 0.3\n"
-GEOMETRY = ("at", "normal", "closure", "length", "pull", "twist", "opening", "sliding", "rise",
-            "carried", "inside")  # fmt: skip
+GEOMETRY = (
+    "position",
+    "normal",
+    "closure",
+    "length",
+    "length_gradient",
+    "length_per_rotation",
+    "opening_rate",
+    "sliding_rate",
+    "tilt_sine",
+    "overlap_length",
+    "range_margin",
+)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +76,7 @@ def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
             ours, theirs = getattr(c, part), getattr(plain, part)
             size = max(float(np.abs(theirs).max(initial=0.0)), 1e-3)
             np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-11 * size, err_msg=part)
-        assert (c.own == plain.own).all()
+        assert (c.corner_takes_over == plain.corner_takes_over).all()
         force, booked, velocity = plain_step(sim, drives.aim, dt)
         scale = np.abs(c.length[:, None] * sim.joints.traction).max(initial=0.0)
         scale = max(scale, float(np.abs(sim.blocks.gravity).max()))
@@ -80,13 +91,15 @@ def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
 
 
 def test_python_and_c_have_the_same_structures():
-    """A field that differs in place would be another array without a word."""
-    header = (Path(jointlaw.__file__).parent / "native" / "blocks.h").read_text(encoding="utf-8")
-    header = re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)
-    for name, structure in (("jl_pool", Pool), ("jl_world", World)):
-        (text,) = re.findall(r"typedef struct \{([^}]*)\} " + name + ";", header)
-        fields = re.findall(r"(\w+)\s*(?=[,;])", text)
-        assert fields == [field for field, _ in structure._fields_]
+    """The built header is made of the present declaration, without padding; C uses every field."""
+    header = (build.BUILT / "layout.h").read_text(encoding="utf-8")
+    source = (build.HERE / "blocks.c").read_text(encoding="utf-8")
+    assert header == layout.layout_h()
+    for pointer, structure in (("law", LawJointArrays), ("sim", StepArrays)):
+        fields = [name for name, _ in structure._fields_]
+        assert ctypes.sizeof(structure) == 8 * len(fields)
+        assert set(re.findall(rf"\b{pointer}->(\w+)", source)) <= {*fields}
+        assert all(re.search(rf"(->|\.){name}\b", source) for name in fields)
 
 
 def test_rounding_of_the_drawing_does_not_choose_between_equal_corners():
@@ -115,9 +128,9 @@ def ring(scene, share, steps):
     sim.dt = share * sim.limit.current
     rng = np.random.default_rng(3)
     sim.blocks.motion[3:] = (
-        1e-7 * rng.standard_normal(sim.blocks.motion[3:].shape) * sim.blocks.mobile.T
+        1e-7 * rng.standard_normal(sim.blocks.motion[3:].shape) * sim.blocks.is_mobile.T
     )
-    sim.blocks.velocity[:] = sim.blocks.motion[3:] * sim.blocks.mobile.T
+    sim.blocks.velocity[:] = sim.blocks.motion[3:] * sim.blocks.is_mobile.T
     size = []
     with contextlib.suppress(SceneError):  # overlap or speed: it has diverged as far as it can
         for _ in range(steps):
@@ -175,7 +188,7 @@ def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
     """A step for 10 Pa, far too long for the fall of a block by 0.1 m: halved, the books close, and
     the block falls as it does with a short step, given or chosen. A long one that is given is
     refused instead."""
-    monkeypatch.setattr(simulation, "IMPACT", 10.0)
+    monkeypatch.setattr(simulation, "IMPACT_STRESS", 10.0)
     fast = Simulation(parse(FALL))
     first = fast.dt
     steps = np.diff(until(fast, 0.4, lambda: fast.time), prepend=0.0)

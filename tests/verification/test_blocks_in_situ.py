@@ -117,7 +117,7 @@ def test_water_takes_its_part_of_the_stress():
     water = "[water]\ntable = [[0, 85]]\n"
     scene = cut(f"k0 = 1.0\nsurface = [[0, {DEPTH}]]", HELD, more=water)
     sim = Simulation(scene)
-    drawn = sim.contacts.at.imag
+    drawn = sim.contacts.position.imag
     left = WEIGHT * (DEPTH - drawn) - 9810 * (85 - drawn)
     c = sim.contacts
     share = np.abs(sim.joints.traction[:, 0] / left - 1)[c.length > 0.02]
@@ -164,7 +164,7 @@ def test_a_block_falls_as_its_support_goes():
         assert fallen[2:] == pytest.approx(9.81 * sim.time**3 / (6 * over), rel=0.02)
         assert abs(sim.energy_balance.error) < 1e-3
     assert sim.stage_start_times == 0.0
-    assert sim.blocks.gone.tolist() == [False, True, False, False]
+    assert sim.blocks.is_removed.tolist() == [False, True, False, False]
     assert abs(fallen[1]) < 1e-15
     assert sim.manager.between(2, 3).any()
     assert not sim.manager.between(1, 2).any()
@@ -192,7 +192,7 @@ def test_a_resumed_excavation_goes_on_bit_for_bit():
         until(sim, 0.12)
     assert np.array_equal(one.blocks.motion, other.blocks.motion)
     assert np.array_equal(one.energy_balance.energy, other.energy_balance.energy)
-    assert other.blocks.mobile[:, 0].tolist() == [False, False, True, True]
+    assert other.blocks.is_mobile[:, 0].tolist() == [False, False, True, True]
 
 
 def test_rock_is_cut_along_what_is_taken_away():
@@ -213,7 +213,7 @@ def test_the_blocks_of_a_tunnel_that_are_named_loose_are_those_that_fall():
     assert not sim.unstable.any()
     drawn = sim.blocks.motion[:2].copy()
     until(sim, 1.0)
-    moved = np.hypot(*(sim.blocks.motion[:2] - drawn)) * ~sim.blocks.gone
+    moved = np.hypot(*(sim.blocks.motion[:2] - drawn)) * ~sim.blocks.is_removed
     assert named.any()
     assert (moved[named] > 0.02).all()
     assert (moved[~named] < 2e-3).all()
@@ -253,7 +253,7 @@ corners = [[1.5, 0.2], [2.0, 0.4], [2.0, 1.0], [1.5, 1.2]]
 
 def unbalanced(sim):
     """Unbalanced forces (n,) at step 0, as shares of the weights."""
-    force = np.hypot(*(sim.energy_balance.forces[0] * sim.blocks.free)[:, :2].T)
+    force = np.hypot(*(sim.energy_balance.forces[0] * sim.blocks.is_free)[:, :2].T)
     return force / np.hypot(*sim.blocks.gravity[:, :2].T).clip(1e-300)
 
 

@@ -13,7 +13,7 @@ from scipy.sparse import diags, hstack
 from dem_demo import Simulation, load, parse
 from dem_demo.contact import ContactManager
 from dem_demo.dynamics.blocks import Blocks
-from dem_demo.dynamics.timestep import rates
+from dem_demo.dynamics.timestep import opening_and_sliding_rates
 from dem_demo.output.run import to_failure
 from dem_demo.studies.strength import FACTOR, factor_of_safety, seated, weakened
 
@@ -53,15 +53,17 @@ def upper_factor(scene, low=0.25, high=4.0, exact=1e-3):
     """
     blocks = Blocks(scene)
     manager = ContactManager(scene, blocks.motion)
-    manager.renew(blocks.motion, blocks.near())
+    manager.rebuild(blocks.motion, blocks.neighbour_pairs())
     contacts = manager.contacts
     carries = np.flatnonzero(contacts.length > 0)
-    k, free = len(contacts.length), blocks.free.ravel()
-    ways = rates(blocks, contacts)[np.concatenate([carries, k + carries])].T  # of N, and of shear
+    k, free = len(contacts.length), blocks.is_free.ravel()
+    ways = opening_and_sliding_rates(blocks, contacts)[
+        np.concatenate([carries, k + carries])
+    ].T  # of N, and of shear
     friction = np.array([law.friction for law in scene.laws.values()])[manager.law[carries]]
     n = len(carries)
     press, shear = ways[:, :n], ways[:, n:]
-    load = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[free]
+    load = ((blocks.gravity + blocks.loads) * blocks.inverse_sqrt_inertia).ravel()[free]
     scale = np.abs(load).max()
 
     def holds(factor):

@@ -128,7 +128,9 @@ def test_factor_of_safety_of_a_slope_is_that_of_coulomb_of_the_same_strength():
     sim = Simulation(weakened(one, 0.97 * found))
     laws, pairs, pressed = dict(one.laws), {}, {}
     c = sim.contacts
-    contacts = zip(c.a.tolist(), c.b.tolist(), sim.joints.traction[:, 0], c.length, strict=True)
+    contacts = zip(
+        c.block_a.tolist(), c.block_b.tolist(), sim.joints.traction[:, 0], c.length, strict=True
+    )
     for one_block, other, stress, length in contacts:
         sums = pressed.setdefault(frozenset((one_block, other)), [0.0, 0.0])
         sums[0] += stress * length
@@ -151,7 +153,7 @@ def test_a_stopped_search_goes_on(tmp_path, monkeypatch, capsys):
     tells factor and tilt, and draws the failure."""
     scene, out, asked = tmp_path / "slab.toml", tmp_path / "out", []
     scene.write_text(SCENE)
-    real = strength.displacements
+    real = strength.equilibrium_displacements
 
     def stops_at_the_fourth(*given):
         asked.append(given)
@@ -159,7 +161,7 @@ def test_a_stopped_search_goes_on(tmp_path, monkeypatch, capsys):
             raise KeyboardInterrupt
         return real(*given)
 
-    monkeypatch.setattr(strength, "displacements", stops_at_the_fourth)
+    monkeypatch.setattr(strength, "equilibrium_displacements", stops_at_the_fourth)
     words = ["strength-reduction", str(scene), "--out", str(out), "--until", "0.01"]
     assert main(words) == 130
     assert "the same command goes on" in capsys.readouterr().err

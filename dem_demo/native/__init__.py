@@ -1,0 +1,6 @@
+"""The compiled step of the blocks: its structures, its source in C, and how it is built.
+
+layout         the structures that Python and C share; `layout.h` is made from it
+blocks.c       the step
+build          makes the library; `python -m dem_demo.native` calls it
+"""

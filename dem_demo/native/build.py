@@ -1,0 +1,38 @@
+"""Builds the library of the compiled step, by the compilers that `jointlaw.native.build` finds."""
+
+import hashlib
+from pathlib import Path
+
+from jointlaw.native import build as law_build
+
+from . import layout
+
+HERE = Path(__file__).parent
+BUILT = HERE / "built"  # the library, and layout.h
+
+
+def hash_sources() -> str:
+    """Hash of the sources of the library, by which a stale library is recognised."""
+    digest = hashlib.sha256(layout.layout_h().encode())
+    for path in (HERE / "blocks.c", HERE / "build.py"):
+        digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
+    return digest.hexdigest()[:16]
+
+
+def library_name(system: str) -> str:
+    """File name of the library on an operating system."""
+    return law_build.library_name(system, "libdem_demo")
+
+
+def build(compiler: law_build.Compiler, folder: Path = BUILT) -> Path:
+    """Build the library in the folder and return its path.
+
+    Raises RuntimeError with the messages of the compiler if it fails.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "layout.h").write_text(layout.layout_h(), encoding="utf-8")
+    # the narrowest vectors: one library for every processor of this kind
+    identity = f'-DDEM_SOURCES="{hash_sources()}"'
+    unit = law_build.Unit(HERE / "blocks.c", min(law_build.LEVELS), (identity,))
+    library = folder / library_name(compiler.machine[1])
+    return law_build.build_library(compiler, [unit], library)

@@ -1,0 +1,163 @@
+"""The structures that Python and `blocks.c` share, declared once.
+
+`layout_h` writes them in C, and `dem_demo/compiled.py` makes the same structures for ctypes. Every
+field takes eight bytes, so that no compiler pads between them. By the standard library alone: the
+library is built with the package, where numpy may be missing.
+"""
+
+import ctypes
+from typing import NamedTuple
+
+# Columns of the law's measures for one joint, in the order of `jointlaw.kernels.engine.Step.shown`
+MEASURES = ("sliding", "slipping", "separated", "stored_energy", "dissipated_energy", "damage")
+ENERGIES = (
+    "kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned",
+)  # fmt: skip
+
+
+class Constant(NamedTuple):
+    """A number that Python and C share."""
+
+    value: float
+    about: str
+
+
+CONSTANTS = {
+    "PARALLEL_SINE": Constant(1e-9, "sine of an angle that differs from 0 by rounding only"),
+    "RANGE_TOLERANCE": Constant(1e-10, "m by which a corner may leave its range: no chatter"),
+}
+
+
+class Field(NamedTuple):
+    """A field of a structure: its type in C, and the array or number that it holds."""
+
+    c_type: str
+    about: str
+
+    @property
+    def ctype(self) -> type:
+        """Type for ctypes: addresses of arrays have no type there."""
+        if "*" in self.c_type:
+            return ctypes.c_void_p
+        return {"long long": ctypes.c_longlong, "double": ctypes.c_double}[self.c_type]
+
+
+LAW_JOINTS = {
+    "d": Field("double *", "(places, 2): increments of the next step of the law, m"),
+    "F": Field("const double *", "(places, 2): tractions after it, Pa"),
+    "measures": Field("const double *", "(places, DEM_MEASURES + 2): measures; displacement, m"),
+    "stress": Field("const double *", "(points,): normal stress of the first-loading curve, Pa"),
+    "stiffness": Field("const double *", "(points,): upper bound of the stiffness there, Pa/m"),
+    "points": Field("long long", "of the first-loading curve"),
+    "bears_tension": Field("long long", "1 if its joints bear tension until they are damaged"),
+}
+STEP = {
+    "n_blocks": Field("long long", "n"),
+    "n_corners": Field("long long", "c"),
+    "n_contacts": Field("long long", "k"),
+    "n_driven": Field("long long", "motions of blocks that drives prescribe"),
+    # ------------------------------------------------------------------ numbers of a scene
+    "thickness": Field("double", "m"),
+    "corner_length": Field("double", "m: length of joint at a corner on an edge"),
+    "transition_length": Field("double", "m: over which a corner gives way to another"),
+    "law_steps": Field("double", "steps of the law per time step"),
+    "dashpot_normal": Field("double", "fraction of critical damping"),
+    "dashpot_shear": Field("double", "fraction of critical damping"),
+    "max_skin_per_step": Field("double", "fraction of its skin that a block may move in a step"),
+    "max_skin_until_rebuild": Field("double", "fraction until its contacts are searched again"),
+    # ------------------------------------------------------------------ blocks
+    "motion": Field("double *", "(6, n): x, y, rotation; velocities that led there"),
+    "velocity": Field("double *", "(3, n): velocities of the next step"),
+    "rebuilt_at": Field("double *", "(3, n): x, y, rotation at the last contact search"),
+    "forces": Field("double *", "(3, n, 3): total, dashpots, drives; N and N m"),
+    "previous_forces": Field("double *", "(2, n, 3): dashpots, drives, one step before"),
+    "inertia": Field("const double *", "(n, 3): mass, mass, moment of inertia"),
+    "gravity": Field("const double *", "(n, 3): N"),
+    "loads": Field("const double *", "(n, 3): other loads, N and N m"),
+    "inverse_mass": Field("const double *", "(n,): 1/kg, 0 for a block that forces do not move"),
+    "radius": Field("const double *", "(n,): m, from the centroid to the farthest corner"),
+    "skin": Field("const double *", "(n,): m"),
+    "max_overlap": Field("const double *", "(n,): m"),
+    "is_mobile": Field("const unsigned char *", "(n,): 1 for a block that moves"),
+    "needs_rebuild": Field("unsigned char *", "(n,): 1 where contacts must be searched again"),
+    # ------------------------------------------------------------------ corners; edge i starts at i
+    "local_corner": Field("const dem_vector *", "(c,): from the centroid, block not rotated"),
+    "local_direction": Field("const dem_vector *", "(c,): of the edge, block not rotated"),
+    "edge_length": Field("const double *", "(c,): m"),
+    "block": Field("const long long *", "(c,): block of the corner"),
+    "previous": Field("const long long *", "(c,): corner before it"),
+    "next": Field("const long long *", "(c,): corner after it"),
+    "corner_position": Field("dem_vector *", "(c,): now, m"),
+    "edge_direction": Field("dem_vector *", "(c,): now"),
+    # ------------------------------------------------------------------ contacts: corner on edge
+    "corner": Field("long long *", "(k,)"),
+    "edge": Field("long long *", "(k,)"),
+    "block_a": Field("long long *", "(k,): the block with the lower number"),
+    "block_b": Field("long long *", "(k,): the other block"),
+    "position": Field("dem_vector *", "(k,): m"),
+    "normal": Field("dem_vector *", "(k,): from block a to block b"),
+    "closure": Field("double *", "(k,): m, depth of the corner below the line of the edge"),
+    "length": Field("double *", "(k,): m, of the joint that the contact stands for"),
+    "length_gradient": Field("dem_vector *", "(k,): of the length by displacement of b"),
+    "length_per_rotation": Field("double *", "(k,): m, derivative by rotation of b"),
+    "opening_rate": Field("double *", "(k,): m/s, of b relative to a along the normal"),
+    "sliding_rate": Field("double *", "(k,): m/s, a quarter turn clockwise from the normal"),
+    "tilt_sine": Field("double *", "(2, k): of either side of the corner against the edge"),
+    "overlap_length": Field("double *", "(2, k): m, of joint where that side lies on the edge"),
+    "range_margin": Field("double *", "(2, k): m, inside the corner's range; below 0 outside"),
+    "corner_takes_over": Field("unsigned char *", "(2, k): beyond it, another corner or edge"),
+    "previous_length": Field("double *", "(k,): m, before the corner went on to another edge"),
+    "closure_offset": Field("double *", "(k,): m; below 0 it acts at any depth"),
+    "work_rows": Field("long long *", "(k,): scratch space"),
+    # ------------------------------------------------------------------ joints
+    "laws": Field("const dem_law_joints *", "one for each law"),
+    "law": Field("const long long *", "(k,): number of the law"),
+    "place": Field("const long long *", "(k,): place among the joints of that law"),
+    "first_touch": Field("const double *", "(k, 2): displacement of the law at first touch, m"),
+    "reduction": Field("const double *", "(2,): 1, and the factor of a strength reduction"),
+    "traction": Field("double *", "(k, 2): normal, shear; Pa"),
+    "delta": Field("double *", "(k, 2): closure and sliding since first touch, m"),
+    "measures": Field("double *", "(DEM_MEASURES, k)"),
+    "area": Field("double *", "(k,): m2, at the last step"),
+    "booked_dissipation": Field("double *", "(k,): J/m2, already in the energy balance"),
+    "checked_stiffness": Field("double *", "(k,): N/m for which the time step is stable"),
+    # ------------------------------------------------------------------ drives
+    "driven_block": Field("const long long *", "(n_driven,)"),
+    "driven_axis": Field("const long long *", "(n_driven,): 0 x, 1 y, 2 rotation"),
+    "driven_velocity": Field("const double *", "(n_driven,): to be reached in this step"),
+    # ------------------------------------------------------------------ what a step reports
+    "energy": Field("double *", "(DEM_ENERGIES,): J"),
+    "too_fast": Field("long long", "a block that moves too far in a step; -1 for none"),
+    "too_deep": Field("long long", "a contact that overlaps too much; -1 for none"),
+    "transferred": Field("long long", "contacts that went on to another corner or edge"),
+    "rebuild": Field("long long", "1 if contacts must be searched again"),
+    "stiffened": Field("long long", "joints stiffer than `checked_stiffness`"),
+}
+STRUCTURES = {"dem_law_joints": LAW_JOINTS, "dem_step": STEP}
+
+
+def _enumeration(names: tuple[str, ...], count: str) -> str:
+    return f"enum {{ {', '.join(f'DEM_{name.upper()}' for name in names)}, DEM_{count} }};"
+
+
+def layout_h() -> str:
+    """The text of layout.h."""
+    lines = [
+        "/* Made from dem_demo/native/layout.py; change it there. */",
+        "#ifndef DEM_LAYOUT_H",
+        "#define DEM_LAYOUT_H",
+        *(
+            f"#define DEM_{name} {value!r} /* {about} */"
+            for name, (value, about) in CONSTANTS.items()
+        ),
+        _enumeration(MEASURES, "MEASURES"),
+        _enumeration(ENERGIES, "ENERGIES"),
+        "typedef struct { double x, y; } dem_vector;",
+    ]
+    for name, fields in STRUCTURES.items():
+        lines += [
+            "typedef struct {",
+            *(f"  {field.c_type} {key}; /* {field.about} */" for key, field in fields.items()),
+            f"}} {name};",
+        ]
+    return "\n".join([*lines, "#endif\n"])

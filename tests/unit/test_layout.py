@@ -1,5 +1,4 @@
-"""How the files of both packages hang together: imports one way, those of public names, and slow
-ones only when they are asked for."""
+"""Imports of both packages: without cycles, dem_demo of public names only, slow modules lazily."""
 
 import ast
 import re
@@ -11,10 +10,11 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import jointlaw as jl
+from jointlaw.hosts import HOSTS
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("jointlaw", "dem_demo")
-LATE = (
+LAZY_MODULES = (
     "matplotlib", "pymunk", "tqdm", "pandas", "scipy.stats", "scipy.optimize", "scipy.spatial",
     "jointlaw.calibration", "jointlaw.surface", "jointlaw.tables.tabulate",
 )  # fmt: skip
@@ -28,18 +28,20 @@ def trees():
 
 
 def file_of(module):
-    """The file that a dotted name stands for, if it is one of ours."""
+    """The file of a dotted module name, None for other packages."""
     stem = module.replace(".", "/")
     return next((f for f in (f"{stem}.py", f"{stem}/__init__.py") if f in trees()), None)
 
 
 def names(path, types=False):
-    """Dotted names that a file imports anywhere when it runs, at its top and in functions; with
-    `types` also those under TYPE_CHECKING."""
+    """Dotted names that a file imports at its top and in functions.
+
+    types: whether imports under TYPE_CHECKING count.
+    """
     nodes = list(ast.walk(trees()[path]))
-    tests = [one for one in nodes if isinstance(one, ast.If) and not types]
-    typing = [one for one in tests if getattr(one.test, "id", "") == "TYPE_CHECKING"]
-    skipped = {id(part) for one in typing for part in ast.walk(one)}
+    conditions = [node for node in nodes if isinstance(node, ast.If) and not types]
+    typing = [node for node in conditions if getattr(node.test, "id", "") == "TYPE_CHECKING"]
+    skipped = {id(part) for node in typing for part in ast.walk(node)}
     for node in nodes:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -52,22 +54,22 @@ def names(path, types=False):
 def imported(path, types=False):
     """Files that a file imports.
 
-    Importing a module also runs the `__init__.py` above it; that counts only where a name is taken
-    from there, for the root's imports everything.
+    Importing a module also runs the `__init__.py` of its package. That counts only where a name is
+    imported from the package, because the root package imports everything.
     """
-    found = {file_of(name) or file_of(name.rpartition(".")[0]) for name in names(path, types)}
-    return found - {None, path}
+    files = {file_of(name) or file_of(name.rpartition(".")[0]) for name in names(path, types)}
+    return files - {None, path}
 
 
-def test_no_circle_of_files_or_folders():
-    """graphlib names the circle: move what both need into one below them.
+def test_imports_have_no_cycle():
+    """Neither files nor folders; the error names the cycle: move the common part into a file below.
 
-    Types count for folders, too: a folder that names those of another lies above it.
+    Types count for folders: a folder that names a type of another folder lies above it.
     """
     folders = defaultdict(set)
     for path in trees():
-        others = {file.rpartition("/")[0] for file in imported(path, types=True)}
-        folders[path.rpartition("/")[0]] |= others - set(PACKAGES)
+        imports = {file.rpartition("/")[0] for file in imported(path, types=True)}
+        folders[path.rpartition("/")[0]] |= imports - set(PACKAGES)
     inner = {folder: folders[folder] - {folder} for folder in folders.keys() - set(PACKAGES)}
     for graph in ({path: imported(path) for path in trees()}, inner):
         TopologicalSorter(graph).prepare()
@@ -80,44 +82,46 @@ def test_jointlaw_never_imports_the_demo():
 
 
 def public_names():
-    """Full names of what docs/api.md shows; "MODULE.*" where it shows all of a module."""
-    shown = set()
-    inside = ""
+    """Full names on docs/api.md; "MODULE.*" where it documents all members of a module."""
+    public = set()
+    current_module = ""
     module = ""
     for line in (ROOT / "docs/api.md").read_text(encoding="utf-8").splitlines():
-        if found := re.match(r"\.\. currentmodule:: (\S+)", line):
-            inside = f"{found[1]}."
-        elif found := re.match(r"\.\. auto(\w+):: (\S+)", line):
-            module = found[2] if found[1] == "module" else ""
-            shown.add(found[2] if "." in found[2] else inside + found[2])
-        elif module and (found := re.match(r"   :members:(.*)", line)):
-            shown |= {f"{module}.{name.strip() or '*'}" for name in found[1].split(",")}
-    return shown
+        if match := re.match(r"\.\. currentmodule:: (\S+)", line):
+            current_module = f"{match[1]}."
+        elif match := re.match(r"\.\. auto(\w+):: (\S+)", line):
+            module = match[2] if match[1] == "module" else ""
+            public.add(match[2] if "." in match[2] else current_module + match[2])
+        elif line == ".. hosts::":
+            public |= {f"{current_module}{host.function}" for host in HOSTS.values()}
+        elif module and (match := re.match(r"   :members:(.*)", line)):
+            public |= {f"{module}.{name.strip() or '*'}" for name in match[1].split(",")}
+    return public
 
 
-def test_every_public_name_loads_and_stands_on_the_api_page():
-    shown = {name for name in public_names() if re.fullmatch(r"jointlaw\.\w+", name)}
-    assert shown == {f"jointlaw.{name}" for name in jl.__all__}
+def test_every_public_name_loads_and_is_on_the_api_page():
+    documented = {name for name in public_names() if re.fullmatch(r"jointlaw\.\w+", name)}
+    assert documented == {f"jointlaw.{name}" for name in jl.__all__}
     for name in jl.__all__:
         assert getattr(jl, name).__name__.rpartition(".")[2] == name
 
 
 def test_the_example_host_imports_public_names_only():
-    """What dem_demo takes of jointlaw stands in docs/api.md: a host of others has it too."""
+    """All names that dem_demo imports from jointlaw are on docs/api.md, for hosts of others."""
     public = public_names()
     demo = [path for path in trees() if path.startswith("dem_demo/")]
-    taken = {(path, name) for path in demo for name in names(path, types=True)}
-    hidden = {
+    imports = {(path, name) for path in demo for name in names(path, types=True)}
+    private = {
         (path, name)
-        for path, name in taken
+        for path, name in imports
         if name.startswith("jointlaw.") and not {name, f"{name.rpartition('.')[0]}.*"} & public
     }
-    assert not hidden, f"give them a public place, or do without: {sorted(hidden)}"
-    assert ("dem_demo/cli.py", "jointlaw.PathError") in taken
+    assert not private, f"document them on docs/api.md, or do not use them: {sorted(private)}"
+    assert ("dem_demo/cli.py", "jointlaw.PathError") in imports
 
 
-def test_a_code_that_embeds_the_law_loads_no_tools_for_measurements():
+def test_importing_jointlaw_loads_no_slow_modules():
     code = "import sys, jointlaw; print(*sys.modules)"
     modules = subprocess.check_output([sys.executable, "-c", code], text=True).split()
     assert "jointlaw" in modules
-    assert [module for module in modules if module.startswith(LATE)] == []
+    assert [module for module in modules if module.startswith(LAZY_MODULES)] == []

@@ -1,5 +1,4 @@
-"""What is refused before any work: parameters, arguments and keys of files, by name, value and
-bound."""
+"""Invalid parameters, arguments and keys of files raise an error that names value and bound."""
 
 import re
 import tomllib
@@ -18,18 +17,18 @@ from jointlaw.support.checks import number
 GOOD = kinds.make_law(bond=jl.Bond(2e9, 1e9, 1e6, 3e6, 300.0, 5000.0))
 NAN = float("nan")
 INF = float("inf")
-NO_NUMBERS = ["1", "", b"1", True, 1j, [1.0], {}, object, NAN, 10**400]
+NOT_NUMBERS = ["1", "", b"1", True, 1j, [1.0], {}, object, NAN, 10**400]
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, (_, _, said) in kinds.PARAMETERS.items() if said.kind is float]
+    "name", [name for name, (_, _, declared) in kinds.PARAMETERS.items() if declared.kind is float]
 )
-def test_what_is_no_finite_number(name):
+def test_a_value_that_is_not_a_finite_number(name):
     law, _ = kinds.off_default(name)
-    (_, path, said) = kinds.PARAMETERS[name]
-    for no_number in NO_NUMBERS if said.infinite else [*NO_NUMBERS, INF, -INF]:
+    _, path, declared = kinds.PARAMETERS[name]
+    for value in NOT_NUMBERS if declared.infinite else [*NOT_NUMBERS, INF, -INF]:
         with pytest.raises(ValueError, match=rf"{path} = .* is not (a number|finite)"):
-            kinds.with_value(law, path, no_number)
+            kinds.with_value(law, path, value)
 
 
 @pytest.mark.parametrize(
@@ -73,8 +72,8 @@ def test_what_is_no_finite_number(name):
     ],
 )
 def test_a_value_out_of_bounds(path, value, bound):
-    said = re.escape(f"{path} = {value!r}")
-    with pytest.raises(ValueError, match=f"{said}.*{re.escape(bound)}"):
+    message = re.escape(f"{path} = {value!r}")
+    with pytest.raises(ValueError, match=f"{message}.*{re.escape(bound)}"):
         kinds.with_value(GOOD, path, value)
 
 
@@ -94,22 +93,22 @@ MATING = kinds.make_law(mating_length=1e-5)
 FIELD = {"jrc": 10.0, "jcs": 100e6, "length": 0.1, "normal_stress": 1e6,
          "normal_stiffness": 30e9, "basic_friction": np.radians(30.0)}  # fmt: skip
 UNIFORM = [1], [0.0, 1e-5]
-HIDDEN = np.ma.masked_array([1e-7, 0.0, 0.0], [False, True, False])
-NO_CLOSURE = r"1e\+12 Pa is beyond any closure"
-NO_TRUTH = r"mated = .* must be True or False, or an array"
-TOO_FAR = "joint 1: .* leads beyond largest_reach"
-NO_RANGE = "give the smallest and the largest normal stress"
+MASKED = np.ma.masked_array([1e-7, 0.0, 0.0], [False, True, False])
+NO_FINITE_CLOSURE = r"1e\+12 Pa is beyond any closure"
+NOT_BOOLEANS = r"mated = .* must be True or False, or an array"
+BEYOND = "joint 1: .* leads beyond largest_reach"
+NOT_A_RANGE = "give the smallest and the largest normal stress"
 
 
-def far(law, share):
-    """States of two joints, the second closed to this share of what can be computed."""
+def closed_states(law, fraction):
+    """States of two joints, the second closed to this fraction of `largest_reach`."""
     states = np.zeros((2, law.state_size))
-    states[:, 0] = 1e-7, share * law.largest_reach
+    states[:, 0] = 1e-7, fraction * law.largest_reach
     return states
 
 
 @pytest.mark.parametrize(
-    ("call", "told"),
+    ("call", "message"),
     [
         (lambda law: kinds.with_value(GOOD, "bond.cohesion", 0.0), "energy_II = 5000.0 .*<= 0"),
         (lambda law: jl.Asperity.hertz_mindlin(-1.0, 0.2, 1e-5, 0.3), "G"),
@@ -120,25 +119,28 @@ def far(law, share):
         (lambda law: jl.Orientation.from_moments(1e-300, 1e300), "variance"),
         (lambda law: jl.GammaHeights.from_moments(1e-6, NAN), "variance"),
         (lambda law: law.closure(-1.0), r"normal_stress = -1\.0 is out of bounds"),
-        (lambda law: WEAK.closure(1e12), NO_CLOSURE),
-        (lambda law: WEAK.closure([1e3, 1e12]), NO_CLOSURE),
+        (lambda law: WEAK.closure(1e12), NO_FINITE_CLOSURE),
+        (lambda law: WEAK.closure([1e3, 1e12]), NO_FINITE_CLOSURE),
         (lambda law: law.joint(mated=False), "mated=False.*infinite mating_length"),
         (lambda law: law.joints(3, mated=False), "mated=False.*infinite mating_length"),
         (lambda law: kinds.LAWS["closure only"].joint(mated=False), "mated=False.*closure_only"),
         (lambda law: MATING.joint(1e6, mated=False), "mated=False.*starts at first touch"),
-        (lambda law: law.joints(3, mated=[True]), NO_TRUTH),
-        (lambda law: law.joints(3, mated=[True, True]), NO_TRUTH),
-        (lambda law: law.joints(3, mated=1), NO_TRUTH),
-        (lambda law: law.joints(3, mated="yes"), NO_TRUTH),
-        (lambda law: law.joint().update(HIDDEN), "d has masked numbers"),
+        (lambda law: law.joints(3, mated=[True]), NOT_BOOLEANS),
+        (lambda law: law.joints(3, mated=[True, True]), NOT_BOOLEANS),
+        (lambda law: law.joints(3, mated=1), NOT_BOOLEANS),
+        (lambda law: law.joints(3, mated="yes"), NOT_BOOLEANS),
+        (lambda law: law.joint().update(MASKED), "d has masked numbers"),
         (lambda law: law.step(np.zeros(3), np.zeros(3)), "expected"),
         (lambda law: law.step(np.zeros((2, law.state_size)), np.zeros(3)), "expected"),
-        (lambda law: law.at_tolerance(0.05, stress=3e4), NO_RANGE),
-        (lambda law: law.at_tolerance(0.05, stress=(1e6, 3e4)), NO_RANGE),
-        (lambda law: law.at_tolerance(0.05, stress=(0.0, 1e6)), NO_RANGE),
-        (lambda law: law.at_tolerance(0.05, stress=(3e4, 1e5, 1e6)), NO_RANGE),
-        (lambda law: law.step(far(law, 0.0), far(law, 1.1)[:, :3]), TOO_FAR),
-        (lambda law: law.step(far(law, 1.1), np.zeros((2, 3))), TOO_FAR),
+        (lambda law: law.at_tolerance(0.05, stress=3e4), NOT_A_RANGE),
+        (lambda law: law.at_tolerance(0.05, stress=(1e6, 3e4)), NOT_A_RANGE),
+        (lambda law: law.at_tolerance(0.05, stress=(0.0, 1e6)), NOT_A_RANGE),
+        (lambda law: law.at_tolerance(0.05, stress=(3e4, 1e5, 1e6)), NOT_A_RANGE),
+        (
+            lambda law: law.step(closed_states(law, 0.0), closed_states(law, 1.1)[:, :3]),
+            BEYOND,
+        ),
+        (lambda law: law.step(closed_states(law, 1.1), np.zeros((2, 3))), BEYOND),
         (
             lambda law: law.joints(3, normal_stress=[1e6, 2e6]),
             r"normal_stress has shape \(2,\): give one or \(3,\)",
@@ -146,7 +148,7 @@ def far(law, share):
         (lambda law: law.joint(-1.0), "normal_stress = -1"),
         (lambda law: jl.JointLaw.from_toml("missing.toml"), "does not exist"),
         (lambda law: jl.JointLaw.from_toml(law.to_toml()), "TOML text.* use from_text"),
-        # of a density that ends in a step: its slope falls at the very end, beyond every quantile
+        # the slope of a density that ends in a step falls at its end, beyond every quantile
         (lambda law: kinds.make_law(heights=jl.Heights(UNIFORM, 0.0, "population")), "not convex"),
         (
             lambda law: kinds.make_law(heights=jl.Heights(UNIFORM, 9.9e-6, "population")),
@@ -155,9 +157,9 @@ def far(law, share):
         *(
             (
                 lambda law, d=distribution: jl.Heights(d, 0.0, "individual"),
-                rf"heights\.distribution.*{told}",
+                rf"heights\.distribution.*{message}",
             )
-            for distribution, told in (
+            for distribution, message in (
                 (5, "must be"),
                 ("chi2", "GammaHeights"),
                 (([1, 2], [0.0, 1.0]), "2 counts need 3 edges, got 2"),
@@ -182,13 +184,13 @@ def far(law, share):
         ),
     ],
 )
-def test_an_argument_that_a_call_refuses(law, call, told):
-    with pytest.raises(ValueError, match=told):
+def test_an_invalid_argument_of_a_call(law, call, message):
+    with pytest.raises(ValueError, match=message):
         call(law)
 
 
 @pytest.mark.parametrize(
-    "ask",
+    "call",
     [
         lambda law, u: law.normal_stress([1e-7, u]),
         lambda law, u: law.max_stiffness(0.0, u),
@@ -196,12 +198,12 @@ def test_an_argument_that_a_call_refuses(law, call, told):
         lambda law, u: jl.secant(law, [0, -u, 0]),
     ],
 )
-def test_closures_whose_forces_overflow(law, ask):
-    """Beyond `largest_reach` a number would be infinite, or next to it: refused."""
-    ask(law, 0.3 * law.largest_reach)
+def test_closures_whose_forces_overflow(law, call):
+    """Beyond `largest_reach` a force would overflow, so the closure is refused."""
+    call(law, 0.3 * law.largest_reach)
     for value in (10.0 * law.largest_reach, 1e300):
         with pytest.raises(ValueError, match=r"(closure|delta) = .* is out of bounds.*overflow"):
-            ask(law, value)
+            call(law, value)
 
 
 HEIGHTS = "alpha = 3.82\nbeta = 1.15e-6\noverlap = 2e-6\n"
@@ -254,8 +256,8 @@ mu = 0.3
         ("[heights]", "[[heights]]", "key 'heights' must be a table"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_by_file_and_key(tmp_path, old, new, message):
-    """The same for a file and for its text."""
+def test_a_mistake_in_a_file_is_named_by_file_and_key(tmp_path, old, new, message):
+    """The messages are the same for a file and for its text."""
     path = tmp_path / "bad.toml"
     text = FILE.replace(old, new, 1)
     path.write_text(text, encoding="utf-8")
@@ -266,14 +268,14 @@ def test_a_mistake_is_told_by_file_and_key(tmp_path, old, new, message):
             read(source)
 
 
-def test_a_file_that_is_no_text(tmp_path):
+def test_a_file_that_is_not_utf_8(tmp_path):
     path = tmp_path / "latin.toml"
     path.write_bytes(b"# \xb5m\n")
     with pytest.raises(ValueError, match=r"latin\.toml.* UTF-8"):
         jl.JointLaw.from_toml(path)
 
 
-def test_a_mapping_is_checked_alike_and_left_alone():
+def test_a_mapping_is_checked_as_a_file_and_not_changed():
     histogram = {"kind": "histogram", "distribution": [[1], [0.0, 1.0]], "formation": "individual"}
     data = tomllib.loads(FILE) | {"heights": histogram}
     before = deepcopy(data)

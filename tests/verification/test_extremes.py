@@ -1,5 +1,7 @@
-"""Laws at the ends of what their parameters allow: what must hold does, after every step; presets
-at stresses from 1 Pa to 10 GPa; a batch that goes on in another process."""
+"""Laws with extreme parameters satisfy all invariants after every step.
+
+Also presets at stresses from 1 Pa to 10 GPa, and a batch that continues in another process.
+"""
 
 import multiprocessing
 import pickle
@@ -13,7 +15,7 @@ from extremes.laws import (
     EXTREMES,
     FULL,
     HEIGHTS,
-    ORDINARY,
+    REFERENCE,
     SCALE,
     alone,
     build,
@@ -24,25 +26,28 @@ from extremes.laws import (
 
 import jointlaw as jl
 
-# chosen to be refused: a population of eta near 0
-NONE = [
+# refused by construction: "population" formation with eta near 0 is not convex
+REFUSED = [
     {"eta": eta, "heights": heights}
     for eta in (0.0, 1e-6)
     for heights in ("printed, population", "alpha = -0.5, overlap 0")
 ]
 
 
-def ends(changes):
-    """Whether the mathematics ends before this law."""
-    return any(item.items() <= changes.items() for item in NONE)
+def is_refused(changes):
+    """Whether a law with these changes has no convex first-loading curve."""
+    return any(item.items() <= changes.items() for item in REFUSED)
 
 
-LAWS = [changes for changes in alone() if not ends(changes)]
+LAWS = [changes for changes in alone() if not is_refused(changes)]
 
 
 def examine(changes, size, seed, n=8, steps=32):
-    """Faults of one law; None when it was refused at construction: it has no virgin curve that can
-    be tabulated, or none that is convex."""
+    """Violated invariants of one law on a random path.
+
+    None if the constructor refuses the law, because its first-loading curve cannot be tabulated or
+    is not convex.
+    """
     try:
         law = build(**changes)
     except ValueError as error:
@@ -53,30 +58,30 @@ def examine(changes, size, seed, n=8, steps=32):
 
 
 @pytest.mark.parametrize("changes", alone(), ids=name)
-def test_alone(changes, record):
+def test_one_extreme_parameter(changes, record):
     faults = examine(changes, SCALE, 1)
     record("alone", not faults)
-    assert faults == (None if ends(changes) else [])
+    assert faults == (None if is_refused(changes) else [])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", list(EXTREMES)[:-1])
-def test_in_pairs(key, record):
+def test_two_extreme_parameters(key, record):
     n, steps = (8, 32) if FULL else (6, 10)
-    held = 0
+    passed = 0
     refused = 0
     for seed, changes in enumerate(pairs()):
         # laws that are refused are slow to refuse
-        if next(iter(changes)) == key and (FULL or not ends(changes)):
+        if next(iter(changes)) == key and (FULL or not is_refused(changes)):
             faults = examine(changes, SCALE, seed, n, steps)
-            assert faults == (None if ends(changes) else []), name(changes)
-            held = held + (faults == [])
-            refused = refused + (faults is None)
-    record("pairs", held, refused, held + refused)
+            assert faults == (None if is_refused(changes) else []), name(changes)
+            passed += faults == []
+            refused += faults is None
+    record("pairs", passed, refused, passed + refused)
 
 
 def test_the_checks_can_fail():
-    """A joint that is pushed beyond friction by hand is caught."""
+    """A joint whose sliders are set beyond the friction limit is reported."""
     joints = build().joints(2)
     joints.update(np.full((2, 3), 0.3 * SCALE))
     state = joints.snapshot()
@@ -85,14 +90,14 @@ def test_the_checks_can_fail():
     assert sliders_within_friction(joints) > 1e-3
 
 
-# 56 and 61: what this very suite found, friction limits of sizes whose squares underflow
+# 56 and 61 once failed: friction limits of sizes whose squares underflow
 SEEDS = 56, 61, *(range(20_000, 20_550) if FULL else range(10_000, 10_100 if COMPILED else 10_040))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(5))
 def test_random_laws_on_random_paths(part):
-    """1e6 updates at full length, a part of them otherwise."""
+    """1e6 updates with JOINTLAW_FULL=1, fewer otherwise."""
     seeds = SEEDS[part::5]
     refused = 0
     for seed in seeds:
@@ -104,26 +109,28 @@ def test_random_laws_on_random_paths(part):
     assert refused < len(seeds) / 2
 
 
-BEYOND = [
+OVERFLOWING = [
     {"K": 1e300}, {"density": 1e300}, {"K": 1e200, "density": 1e200}, {"mu": 1e300}, {"lam": 1e300},
     {"K": 1e-300}, {"K": 5e-324}, {"lam": 1e-300}, {"range": 1e300}, {"eta": 1e300},
     {"range": None, "K": 1e300}, {"range": None, "K": 1e-300},
 ]  # fmt: skip
-# infinite a millionth of a millionth of the heights short of the point of contact: give 0 instead
-SHORT = [{"heights": (-0.9, 1.15e-6, 1e-18, one)} for one in ("individual", "population")]
+# densities that are infinite 1e-12 heights before the first contact; an overlap of 0 is accepted
+INFINITE_NEAR_CONTACT = [
+    {"heights": (-0.9, 1.15e-6, 1e-18, formation)} for formation in ("individual", "population")
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", [*BEYOND, *SHORT], ids=name)
-def test_what_no_float_can_hold_and_densities_beside_their_infinity_are_refused(changes):
-    told = r"asperity.K = .* too (small|large) for floating point"
-    if changes in SHORT:
-        told = r"cannot be tabulated: .* begin them exactly there"
-    with pytest.raises(ValueError, match=told):
+@pytest.mark.parametrize("changes", [*OVERFLOWING, *INFINITE_NEAR_CONTACT], ids=name)
+def test_overflowing_parameters_and_infinite_densities_are_refused(changes):
+    message = r"asperity.K = .* too (small|large) for floating point"
+    if changes in INFINITE_NEAR_CONTACT:
+        message = r"cannot be tabulated: .* begin them exactly there"
+    with pytest.raises(ValueError, match=message):
         build(**changes)
 
 
-INSIDE = [
+CLOSE_TO_OVERFLOW = [
     {"K": 1e100}, {"density": 1e110}, {"K": 1e-120}, {"mu": 1e100}, {"lam": 1e60}, {"eta": 50.0},
     {"eta": 1e3}, {"a": 1e300}, {"range": 5e-324},
     {"heights": (3.82, 1.15e-12, 0.0, "individual")},
@@ -140,16 +147,15 @@ INSIDE = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", INSIDE, ids=name)
-def test_just_inside_the_numbers_of_a_float_everything_holds(changes):
+@pytest.mark.parametrize("changes", CLOSE_TO_OVERFLOW, ids=name)
+def test_parameters_close_to_overflow_satisfy_all_invariants(changes):
     law = build(**changes)
     assert not run(law, min(SCALE, 1e-6 * law.largest_reach), 1, n=6, steps=12)
 
 
 @pytest.mark.parametrize("changes", LAWS, ids=name)
 def test_force_is_lipschitz(changes, record):
-    """Continuous, with the law's own stiffness bound: |F(d + e) - F(d)| / |e| is not above it, for
-    |e| of 1e-9 to 0.1 of |d|."""
+    """|F(d + e) - F(d)| / |e| <= `max_stiffness`, for |e| of 1e-9 to 0.1 of |d|."""
     law = build(**changes)
     n = 8
     steepest = 0.0
@@ -160,13 +166,13 @@ def test_force_is_lipschitz(changes, record):
         e = rng.normal(size=(n, 3)) * size
         before = joints.snapshot()
         G = joints.update(d + e, tangent=False)[0]
-        reach = joints.measures().reach
+        closure = joints.measures().reach
         joints.restore(before)
         F = joints.update(d, tangent=False)[0]
-        reach = np.maximum(reach, joints.measures().reach)
-        # F is a sum of forces of all facets: its rounding is that of the stiffness times the reach
-        bound = law.max_stiffness(reach) * (
-            np.linalg.norm(e, axis=1) + 1e-14 * (np.abs(reach) + np.linalg.norm(d, axis=1))
+        closure = np.maximum(closure, joints.measures().reach)
+        # F is a sum over all facets: its rounding error is proportional to stiffness times closure
+        bound = law.max_stiffness(closure) * (
+            np.linalg.norm(e, axis=1) + 1e-14 * (np.abs(closure) + np.linalg.norm(d, axis=1))
         )
         change = np.linalg.norm(G - F, axis=1)
         steepest = max(steepest, np.max(change / np.where(bound > 0, bound, 1.0)))
@@ -174,9 +180,9 @@ def test_force_is_lipschitz(changes, record):
     assert steepest <= 1.0
 
 
-def scaled(changes, length, force):
-    """The same law with lengths `length` times and forces `force` times as large a number."""
-    p = ORDINARY | changes
+def build_scaled(changes, length, force):
+    """The law in other units: lengths are multiplied by `length`, forces by `force`."""
+    p = REFERENCE | changes
     if heights := HEIGHTS.get(p["heights"]):
         heights = (heights[0], heights[1] * length, heights[2] * length, heights[3])
     return build(**p | {
@@ -190,15 +196,20 @@ def scaled(changes, length, force):
     })  # fmt: skip
 
 
-def kept_digits(changes):
-    """Share of a closure that carries a force: beyond the yield interference springs give way, and
-    the force is the difference of two places on the virgin curve, so much closer to each other."""
+def elastic_fraction(changes):
+    """Elastic part of a closure: yield interference over closure, 1 at most.
+
+    Beyond it the force is a difference of two values of the first-loading curve, which loses as
+    many digits.
+    """
     return min(changes.get("yields at", np.inf) / SCALE, 1.0)
 
 
-def followed(law, d, length=1.0, force=1.0):
-    """F, C, stored and dissipated energy of joints along increments d (steps, n, 3), in the units
-    of a law that is not scaled."""
+def results_along(law, d, length=1.0, force=1.0):
+    """F, C, stored and dissipated energy of joints along increments d (steps, n, 3).
+
+    length, force: factors of the units of `law`; results are in unscaled units.
+    """
     joints = law.joints(d.shape[1])
     rows = []
     for step in d:
@@ -210,36 +221,38 @@ def followed(law, d, length=1.0, force=1.0):
     return [np.reshape(part, (*d.shape[:2], -1)) for part in zip(*rows, strict=True)]
 
 
-# laws with digits left to compare: those of a millionth of a closure are tested `alone` only
+# an elastic fraction of 1e-6 leaves too few digits to compare
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", [law for law in LAWS if kept_digits(law) > 1e-6], ids=name)
+@pytest.mark.parametrize("changes", [law for law in LAWS if elastic_fraction(law) > 1e-6], ids=name)
 def test_results_scale(changes, record):
-    """The law knows no units. Of the peak so far (of both energies together) 1e-12 is asked. Far
-    from mate a joint is sheared by a whole closure while y moves by 1e-5 of itself. There the chord
-    (G1 - G0)/(y1 - y0) keeps 11 digits, as a quotient and as the mean slope alike, and so does the
-    loss of that step."""
+    """Results do not depend on the units: to 1e-12 of the peak so far (of the sum of energies).
+
+    At slips of a mating length a joint is sheared by its closure while y changes by 1e-5 of its
+    value. There the chord (G1 - G0)/(y1 - y0) and the dissipation of the step have 11 digits.
+    """
     length = 1e6
-    unit = 1e-9
+    force = 1e-9
     d, _ = path(np.random.default_rng(3), 8, 24, SCALE)
-    d = np.where(np.abs(d) < 1e-130, 0.0, d)  # 1e-140 of any unit is nothing: that has one
-    one = followed(build(**changes), d)
-    other = followed(scaled(changes, length, unit), d, length, unit)
-    sizes = one[0], one[1], one[2] + one[3], one[2] + one[3]
-    gaps = []
-    for a, b, size in zip(one, other, sizes, strict=True):
+    d = np.where(np.abs(d) < 1e-130, 0.0, d)  # the threshold 1e-140 m does not scale
+    results = results_along(build(**changes), d)
+    scaled_results = results_along(build_scaled(changes, length, force), d, length, force)
+    energy = results[2] + results[3]
+    sizes = results[0], results[1], energy, energy
+    errors = []
+    for a, b, size in zip(results, scaled_results, sizes, strict=True):
         peak = np.maximum.accumulate(np.abs(size).max(axis=2))
-        away = np.abs(a - b).max(axis=2)
-        gaps.append(np.max(away / np.where(peak > 0, peak, 1.0)))
-    force, _, stored, lost = gaps
-    record("units, F", force, name(changes))
-    record("units, energy", max(stored, lost), name(changes))
-    grazing = "mating_length" in changes or "wears over" in changes
-    kept = kept_digits(changes)  # the chord of what is left of G loses digits, too
-    assert max(force, stored) < (1e-12 if kept == 1.0 else 1e-11 / kept)
-    assert lost < (1e-11 / kept if grazing or kept < 1.0 else 1e-12)
+        difference = np.abs(a - b).max(axis=2)
+        errors.append(np.max(difference / np.where(peak > 0, peak, 1.0)))
+    F_error, _, stored_error, dissipated_error = errors
+    record("units, F", F_error, name(changes))
+    record("units, energy", max(stored_error, dissipated_error), name(changes))
+    is_grazing = "mating_length" in changes or "wears over" in changes
+    elastic = elastic_fraction(changes)  # the chord of a small difference G loses digits, too
+    assert max(F_error, stored_error) < (1e-12 if elastic == 1.0 else 1e-11 / elastic)
+    assert dissipated_error < (1e-11 / elastic if is_grazing or elastic < 1.0 else 1e-12)
 
 
-KINDS = [
+SELECTED = [
     {}, {"a": 1.0, "eta": 0.0}, {"a": 1e8}, {"mu": 0.0}, {"mu": 1e6, "lam": 0.1}, {"eta": 2.0},
     {"heights": "printed, population"}, {"heights": "alpha = -0.99, overlap 0"},
     {"mating_length": 0.3 * SCALE},
@@ -247,11 +260,13 @@ KINDS = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", KINDS, ids=name)
-def test_nothing_is_left_at_zero_closure_and_apart(changes):
-    """Closed and opened again to the very point of contact: F, C and energy are exactly zero, and
-    closing again is the first closing, to the bit. Apart, shear meets nothing. At zero closure
-    faces that lean against it are touched at once; faces that lie flat are not."""
+@pytest.mark.parametrize("changes", SELECTED, ids=name)
+def test_force_and_energy_are_zero_at_zero_closure_and_after_separation(changes):
+    """After opening to zero closure F, C and energy are exactly zero; reloading repeats the bits.
+
+    A separated joint resists no shear. At zero closure shear compresses inclined facets at once,
+    but not facets parallel to the joint.
+    """
     law = build(**changes)
     joint = law.joint()
     d = np.array([SCALE, 0.0, 0.0])
@@ -261,47 +276,47 @@ def test_nothing_is_left_at_zero_closure_and_apart(changes):
         assert not np.any([*F, *C.ravel(), joint.stored_energy])
         np.testing.assert_array_equal(joint.update(d)[0], first)
     joint = law.joint()
-    apart = 1e3 * SCALE * float(np.max(np.abs(law.tables.asperities.m[1:])))
-    joint.update([-apart, 0.0, 0.0])
+    opening = 1e3 * SCALE * float(np.max(np.abs(law.tables.asperities.m[1:])))
+    joint.update([-opening, 0.0, 0.0])
     F, C = joint.update([0.0, 100.0 * SCALE, 50.0 * SCALE])
     assert not np.any([*F, *C.ravel(), joint.dissipated_energy])
     F = np.abs(law.joint().update([0.0, SCALE, 0.0])[0])
-    whole = law.normal_stress(SCALE)
-    assert F[1] > 1e-3 * whole if law.orientation.a < 10.0 else F[1] < 1e-6 * whole
+    normal_stress = law.normal_stress(SCALE)
+    assert F[1] > 1e-3 * normal_stress if law.orientation.a < 10.0 else F[1] < 1e-6 * normal_stress
 
 
-# Of the normal stress: the control stops at 1e-11 of it, or where rounding of the closure, 4e-16 of
-# it and stiffer than linear by 1 + eta, leaves less
-MISS = 2e-11
+# Relative error of the normal stress: the control stops at 1e-11, or at the rounding of the
+# closure, 4e-16, times 1 + eta
+CONTROL_ERROR = 2e-11
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", jl.presets.names())
 def test_normal_control_converges_from_1_pascal_to_10_gigapascal(preset):
-    """Closing in six steps and opening again; shear to one closure, there and back."""
+    """Loading in six steps and unloading; shear by one closure and back."""
     law = jl.presets.load(preset)
     levels = (np.arange(1, 7) / 6) ** (1 + law.asperity.eta)
-    asked = np.concatenate([[0.0], levels, levels[-2::-1], [0.0]])
+    expected = np.concatenate([[0.0], levels, levels[-2::-1], [0.0]])
     for stress in 10.0 ** np.arange(11):
         record = jl.closure_test(law.joint(), stress, steps=6)
-        np.testing.assert_allclose(record.F1 / stress, asked, rtol=0, atol=MISS)
-        far = float(law.closure(stress))
-        record = jl.direct_shear(law.joint(), [far, -far], stress, steps=12)
-        np.testing.assert_allclose(record.F1 / stress, 1.0, rtol=0, atol=MISS)
+        np.testing.assert_allclose(record.F1 / stress, expected, rtol=0, atol=CONTROL_ERROR)
+        shear = float(law.closure(stress))
+        record = jl.direct_shear(law.joint(), [shear, -shear], stress, steps=12)
+        np.testing.assert_allclose(record.F1 / stress, 1.0, rtol=0, atol=CONTROL_ERROR)
 
 
-def go_on(batch):
-    """A batch that came from another process takes a step."""
+def take_step(batch):
+    """Traction of a batch from another process after one step."""
     return batch.update(np.full((len(batch), 3), 0.01 * SCALE), tangent=False)[0]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_a_batch_goes_on_in_another_process(method):
-    """After the parent has used its threads, which a fork does not take along."""
+def test_a_batch_continues_in_another_process(method):
+    """Even after the parent has used its threads, which a fork does not inherit."""
     batch = build(resolution=jl.Resolution(1, 3, 1)).joints(5000)
     for d in path(np.random.default_rng(1), 5000, 3, SCALE)[0]:
         batch.update(d)
     with multiprocessing.get_context(method).Pool(1) as pool:
-        elsewhere = pool.apply(go_on, (batch,))
-    np.testing.assert_array_equal(elsewhere, go_on(pickle.loads(pickle.dumps(batch))))
+        F = pool.apply(take_step, (batch,))
+    np.testing.assert_array_equal(F, take_step(pickle.loads(pickle.dumps(batch))))

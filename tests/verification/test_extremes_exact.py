@@ -1,8 +1,8 @@
-"""Against what is exact: the step of the theory written out with 50 digits, on one orientation and
-on few; the virgin curve against Kummer's function; and the energy of one mass on one joint under
-explicit integration at 0.95 of the critical time step.
+"""Exact references: the step with 50 digits, Kummer's function, energy of a mass on a joint.
 
-Source: docs/theory-incremental.md, "Few cells, exact virgin curve".
+The step of the theory is evaluated with 50 digits on one orientation and on few; the first-loading
+curve is compared with Kummer's function; the energy of one mass on one joint is balanced under
+explicit integration at 0.95 of the critical time step. Source: docs/theory-incremental.md.
 """
 
 import mpmath as mp
@@ -25,10 +25,10 @@ CASES = [
 ]  # fmt: skip
 
 
-exact = np.frompyfunc(lambda x: mp.mpf(float(x)), 1, 1)  # to arrays of numbers of mpmath
+exact = np.frompyfunc(lambda x: mp.mpf(float(x)), 1, 1)  # converts to arrays of mpmath numbers
 
 
-class Exact:
+class ExactJoint:
     """One joint without heights: the same facets and nodes, Phi = y^(1 + eta), exact chords."""
 
     def __init__(self, law):
@@ -89,26 +89,28 @@ class Exact:
 
 @pytest.mark.parametrize("changes", CASES, ids=name)
 def test_force_agrees_with_50_digits(changes, record):
-    """1e-12 of |F| is asked. Chords of steps near 1e-5 of y lose five digits of sixteen, and their
-    share of F is as small."""
-    more = {key: value for key, value in changes.items() if key != "depth"}
-    law = build(resolution=jl.Resolution(1, 3, changes["depth"]), **more)
+    """The largest difference is 1e-12 of |F|.
+
+    Chords of steps near 1e-5 of y lose five digits of sixteen, but contribute as little to F.
+    """
+    parameters = {key: value for key, value in changes.items() if key != "depth"}
+    law = build(resolution=jl.Resolution(1, 3, changes["depth"]), **parameters)
     worst = 0.0
     for seed in range(6) if FULL else [6]:
         joint = law.joint()
         rng = np.random.default_rng(seed)
         with mp.workdps(DIGITS):
-            slow = Exact(law)
+            exact_joint = ExactJoint(law)
             for k in range(24):
                 d = rng.normal(size=3) * SCALE * 10.0 ** rng.uniform(-8.0, 0.0)
                 if k % 5 == 0:
                     d = np.array([0.7 * SCALE, 0.0, 0.0])
                 if k % 7 == 6:
                     d[1:] *= 30.0
-                # a grid of 2^-70 m: sums of steps are then exact, and no rounding of delta counts
+                # on a grid of 2^-70 m sums of steps are exact, so that delta has no rounding
                 d = np.round(d * 2.0**70) / 2.0**70
                 F = joint.update(d, tangent=False)[0]
-                G = slow.update(d)
+                G = exact_joint.update(d)
                 size = max(abs(G))
                 worst = max(worst, float(max(abs(exact(F) - G)) / (size if size > 0 else 1)))
     record("exact", *(changes[key] for key in ("a", "mu", "lam", "depth")), worst)
@@ -118,8 +120,11 @@ def test_force_agrees_with_50_digits(changes, record):
 @pytest.mark.parametrize("eta", [0.0, 0.5, 2.0])
 @pytest.mark.parametrize("alpha", [-1.0 + 1e-9, -0.99, -0.5, -0.1])
 def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
-    """Phi of "individual" gamma heights without overlap is Kummer's function, and rises as
-    y^(2 + alpha + eta): over thirty decades, from a table good to 1e-10 of the largest S / w^p."""
+    """Phi of "individual" gamma heights without overlap is Kummer's function.
+
+    It is proportional to y^(2 + alpha + eta) at small y. Over thirty decades the table is accurate
+    to 1e-10 of the largest S / w^p.
+    """
     heights = jl.GammaHeights(alpha, 1.15, 0.0, "individual")
     curve = virgin_curve(eta, heights)
     p = mp.mpf(alpha) + 1
@@ -127,7 +132,7 @@ def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
     rise = mp.gamma(q + 1) / mp.gamma(p + q + 1)
     y = np.geomspace(1e-30, 1e4, 35)
     force, slope = curve.force(y)
-    # at touch the force is a power of y, and so is its integral
+    # at first contact the force is a power of y, and so is its integral
     assert curve.energy(y)[0] / (y[0] * force[0]) == pytest.approx(1 / float(p + q + 1), rel=1e-6)
     with mp.workdps(30):
         for k, z in enumerate(map(mp.mpf, y / 1.15)):
@@ -140,11 +145,11 @@ def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
 
 
 COARSE = jl.Resolution(2, 3, 1)
-MASS = 1e3
-AREA = 1.0  # kg, m2
-EVERY = 5  # steps between looks at the energy: no divisor of a period
-# law, normal stress of the load (Pa), speed of impact as a share of that at rest closure
-MASSES = {
+MASS = 1e3  # kg
+AREA = 1.0  # m2
+ENERGY_INTERVAL = 5  # steps between energies: no divisor of a period
+# law, normal stress of the load (Pa), impact speed over sqrt(load * rest closure / mass)
+CASES = {
     "Hertz at 1 Pa": ({}, 1.0, 0.3),
     "Hertz at 10 GPa": ({}, 1e10, 0.3),
     "Hertz, no friction": ({"mu": 0.0}, 1e7, 0.3),
@@ -157,107 +162,109 @@ MASSES = {
     "many heights": ({"heights": "printed, population"}, 1e7, 1.0),
     "slopes that fade": ({"mating_length": 0.3 * SCALE, "mu": 0.3}, 1e7, 1.0),
 }
-PROBE, STEPS = (6000, 4000) if COMPILED else (1200, 500)
+PROBE_STEPS, STEPS = (6000, 4000) if COMPILED else (1200, 500)
 
 
-class Mass:
-    """n masses, each on its joint under a constant normal load, hit in n directions; leapfrog."""
+class Masses:
+    """n masses on joints under a constant normal load, with n initial velocities; leapfrog."""
 
     def __init__(self, case, n=4):
-        changes, stress, share = MASSES[case]
+        changes, stress, speed_ratio = CASES[case]
         self.law = build(resolution=COARSE, **changes)
         self.load = np.array([stress * AREA, 0.0, 0.0])
         self.joints = self.law.joints(n)
         rest = float(self.law.closure(stress))
-        self.joints.update(np.tile([-rest if share > 1.0 else rest, 0.0, 0.0], (n, 1)))
-        speed = share * np.sqrt(stress * AREA * rest / MASS)
-        toward = np.random.default_rng(4).normal(size=(n, 3))
-        toward[:, 0] = np.abs(toward[:, 0])
-        self.start = toward / np.linalg.norm(toward, axis=1, keepdims=True) * speed
+        self.joints.update(np.tile([-rest if speed_ratio > 1.0 else rest, 0.0, 0.0], (n, 1)))
+        speed = speed_ratio * np.sqrt(stress * AREA * rest / MASS)
+        direction = np.random.default_rng(4).normal(size=(n, 3))
+        direction[:, 0] = np.abs(direction[:, 0])
+        self.start = direction / np.linalg.norm(direction, axis=1, keepdims=True) * speed
         self.rest = rest
 
     def run(self, steps, dt):
         """Energies (every fifth step, n), and the largest effective closure.
 
-        The energy counts the kinetic part as the product of the speeds before and after: that is
-        what leapfrog keeps, to the last digit on a linear spring.
+        The kinetic energy is the product of the velocities before and after the step: leapfrog
+        conserves this energy on a linear spring to rounding.
         """
         joints = self.joints
         load = self.load
-        seen = []
+        samples = []
         v = self.start
         F = joints.F
         for k in range(steps):
-            faster = v + (load - F * AREA) * (dt / MASS)
-            if k % EVERY == 0:
+            v_next = v + (load - F * AREA) * (dt / MASS)
+            if k % ENERGY_INTERVAL == 0:
                 measures = joints.measures()
-                kinetic = 0.5 * MASS * np.sum(v * faster, axis=1)
+                kinetic = 0.5 * MASS * np.sum(v * v_next, axis=1)
                 energy = kinetic + AREA * measures.stored - joints.delta @ load
-                seen.append((energy, measures.reach))
-            v = faster
+                samples.append((energy, measures.reach))
+            v = v_next
             F = joints.update(v * dt, tangent=False)[0]
-        energies, reach = np.array(seen).swapaxes(0, 1)
-        return energies, reach.max()
+        energies, closure = np.array(samples).swapaxes(0, 1)
+        return energies, closure.max()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", MASSES)
+@pytest.mark.parametrize("case", CASES)
 def test_energy_never_rises_above_the_first(case):
-    """At 0.95 of the critical step, impacts from opening and a friction of 0.01 included: no more
-    than the rounding of the sums that energy is, as shares of the kinetic energy at the start and
-    the work of the load up to rest.
+    """At 0.95 of the critical step the energy does not grow, impacts and friction of 0.01 included.
 
-    Leapfrog keeps that of a linear spring to rounding; that of a Hertz contact without friction
-    comes and goes by 1 %, and after a tenth of the run no farther than before.
+    The tolerance is the rounding of the sums, relative to the initial kinetic energy and the work
+    of the load. Leapfrog conserves the energy of a linear spring to rounding. The energy of a Hertz
+    contact without friction oscillates by 1 %, after a tenth of the run not more than before.
     """
-    probe = Mass(case)
-    mass = Mass(case)
+    probe = Masses(case)
+    masses = Masses(case)
     short = 0.1 * probe.law.critical_time_step(MASS, AREA, 10.0 * probe.rest)
-    bound = 1.1 * probe.run(PROBE, short)[1]  # the closure reached, on a fine step
-    energies, reach = mass.run(STEPS, 0.95 * mass.law.critical_time_step(MASS, AREA, bound))
-    assert reach <= bound or "linear" in case  # which is as stiff at any closure
+    bound = 1.1 * probe.run(PROBE_STEPS, short)[1]  # of the closure, in m
+    dt = 0.95 * masses.law.critical_time_step(MASS, AREA, bound)
+    energies, closure = masses.run(STEPS, dt)
+    assert closure <= bound or "linear" in case  # its stiffness does not depend on closure
     early = len(energies) // 10
-    scale = mass.rest * mass.load[0] + 0.5 * MASS * np.sum(mass.start**2, axis=1)
+    scale = masses.rest * masses.load[0] + 0.5 * MASS * np.sum(masses.start**2, axis=1)
     above = (energies.max(axis=0) - energies[0]) / scale
     growth = (energies[early:].max(axis=0) - energies[:early].max(axis=0)) / scale
-    most = (0.02, 1e-3) if case == "Hertz, no friction" else (1e-12, 1e-12)
-    assert above.max() <= most[0]
-    assert growth.max() <= most[1]
+    max_above, max_growth = (0.02, 1e-3) if case == "Hertz, no friction" else (1e-12, 1e-12)
+    assert above.max() <= max_above
+    assert growth.max() <= max_growth
 
 
 @pytest.mark.slow
-def test_beyond_the_critical_step_a_linear_joint_breaks_loose():
-    """The bound is no idle one: the sum of A/c1 in it is the stiffness to the mean of cos^2, so
-    1.2 times its step is too long. Opening ends the growth: a factor, not an overflow."""
-    mass = Mass("linear, no friction")
-    critical = mass.law.critical_time_step(MASS, AREA, mass.rest)
-    calm, _ = Mass("linear, no friction").run(300, 0.95 * critical)
-    wild, _ = mass.run(300, 1.2 * critical)
-    assert np.abs(wild[-1]).max() > 1e3 * np.abs(calm).max()
+def test_beyond_the_critical_step_a_linear_joint_is_unstable():
+    """The bound is close: its sum of A/c1 is the stiffness except for the mean of cos^2.
+
+    1.2 times the critical step is too long. Opening limits the growth to a factor.
+    """
+    masses = Masses("linear, no friction")
+    critical = masses.law.critical_time_step(MASS, AREA, masses.rest)
+    stable, _ = Masses("linear, no friction").run(300, 0.95 * critical)
+    unstable, _ = masses.run(300, 1.2 * critical)
+    assert np.abs(unstable[-1]).max() > 1e3 * np.abs(stable).max()
 
 
 @pytest.mark.slow
 def test_an_undamped_hertz_impact_gains_less_in_smaller_steps(record):
-    """The figures of docs/limits.md, at 4000 phases of the step, with a third in hand.
+    """The figures of docs/limits.md, at 4000 phases of the step; the tolerances are a third larger.
 
-    A unit mass touches flat facets, F = y^1.5, at speed 1. The impact lasts 4.03/omega of its
-    stiffest moment, 2/share steps of this share of the critical step 2/omega.
+    A unit mass hits flat facets, F = y^1.5, at speed 1. The impact lasts 4.03/omega with the
+    largest omega, or 2/ratio steps, where `ratio` is the step over the critical step 2/omega.
     """
-    most = {0.95: np.inf, 0.8: 0.4, 0.5: 0.1, 0.2: 6e-3, 0.1: 6e-4, 0.05: 1e-4}
+    max_gain = {0.95: np.inf, 0.8: 0.4, 0.5: 0.1, 0.2: 6e-3, 0.1: 6e-4, 0.05: 1e-4}
     law = build(
         a=1e8, b=0.0, c=0.0, K=1.0, lam=1.0, mu=0.4, density=1.0, range=1.0,
         resolution=jl.Resolution(1, 3, 1),
     )  # fmt: skip
-    for share, promised in most.items():
-        dt = share * 2.0 / np.sqrt(1.5 * 1.25**0.2)  # the deepest closure is 1.25^0.4
+    for ratio, tolerance in max_gain.items():
+        dt = ratio * 2.0 / np.sqrt(1.5 * 1.25**0.2)  # the deepest closure is 1.25^0.4
         contact = law.joints(4000)
         closing = np.eye(3)[0]
         x = -(np.arange(4000) + 0.5) / 4000 * dt
         v = np.ones(4000)
         contact.update(np.outer(x, closing))
-        for _ in range(int(8.0 / share) + 8):
+        for _ in range(int(8.0 / ratio) + 8):
             v = v - contact.update(np.outer(v * dt, closing), tangent=False)[0][:, 0] * dt
         assert (contact.delta[:, 0] < 0).all()
-        gained = v**2 - 1.0
-        record("impact", share, gained.min(), gained.max())
-        assert gained.max() < promised
+        gain = v**2 - 1.0
+        record("impact", ratio, gain.min(), gain.max())
+        assert gain.max() < tolerance

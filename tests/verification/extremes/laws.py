@@ -1,4 +1,4 @@
-"""Laws at the ends of what the parameters allow: one extreme at a time, in pairs, at random.
+"""Laws with parameters at the bounds of their ranges: one at a time, in pairs, at random.
 
 The tests record their figures as properties of their report (`pytest --junitxml`), from which
 docs/measure/test_figures.py makes tables; docs/validation.md has the figures. With JOINTLAW_FULL=1
@@ -14,8 +14,8 @@ import jointlaw as jl
 from jointlaw.kernels.engine import NativeEngine, engine
 
 FULL = os.environ.get("JOINTLAW_FULL") == "1"
-SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
-ORDINARY = {
+SCALE = 2e-6  # m: closure range and asperity height of the reference law
+REFERENCE = {
     "a": 3.0, "b": 0.5, "c": 0.1, "K": 2e8, "lam": 1.2, "eta": 0.5, "mu": 0.4, "density": 1e10,
     "heights": None, "range": SCALE, "mating_length": np.inf, "resolution": jl.Resolution(2, 4, 3),
     "yields at": np.inf, "wears over": np.inf,
@@ -51,12 +51,12 @@ EXTREMES = {
 
 
 def build(**changes):
-    """The ordinary law with these changes; "b, c" is set as a pair, heights by name or values."""
-    p = ORDINARY | changes
+    """The reference law with changed parameters; "b, c" are a pair, heights a name or values."""
+    p = REFERENCE | changes
     b, c = p.get("b, c", (p["b"], p["c"]))
     heights = HEIGHTS.get(p["heights"], p["heights"])
     length = p["mating_length"]
-    if p["wears over"] < np.inf:  # slopes that wear fade, too
+    if p["wears over"] < np.inf:  # asperity degradation needs a mating length
         length = min(length, 3.0 * p["range"])
     return jl.JointLaw(
         orientation=jl.Orientation(p["a"], b, c),
@@ -73,22 +73,22 @@ def build(**changes):
     )
 
 
-# the numpy kernel takes 20 times as long for small batches: long runs are shorter there
+# the numpy kernel is 20 times slower for small batches: long runs are shorter with it
 COMPILED = isinstance(engine(build().tables), NativeEngine)
 
 
 def name(changes):
-    """What distinguishes a law from the ordinary one."""
-    return ", ".join(f"{key} = {value}" for key, value in changes.items()) or "ordinary"
+    """The changed parameters of a law, as the name of a test."""
+    return ", ".join(f"{key} = {value}" for key, value in changes.items()) or "reference"
 
 
 def alone():
-    """The ordinary law, and each extreme alone."""
+    """Changes for the reference law and for each extreme value alone."""
     return [{}, *({key: value} for key, values in EXTREMES.items() for value in values)]
 
 
 def pairs():
-    """Every two extremes together."""
+    """Changes for every two extreme values together."""
     return [
         {k1: v1, k2: v2}
         for k1, k2 in combinations(EXTREMES, 2)
@@ -98,14 +98,17 @@ def pairs():
 
 
 def random_changes(rng):
-    """Any admissible parameters, over many decades, a third of them exactly on an extreme."""
+    """Random admissible parameters over many decades, a third of them at an extreme value.
 
-    def pick(key, otherwise):
+    Returns the changes and a length (m) for the size of steps.
+    """
+
+    def pick(key, value):
         chance = rng.random()
-        return EXTREMES[key][rng.integers(len(EXTREMES[key]))] if chance < 0.3 else otherwise
+        return EXTREMES[key][rng.integers(len(EXTREMES[key]))] if chance < 0.3 else value
 
     b = rng.uniform(-1.0, 2.0)
-    unit = 10.0 ** rng.uniform(-8.0, 8.0)  # of length, with the ordinary one
+    unit = 10.0 ** rng.uniform(-8.0, 8.0)  # of length, times the reference length
     changes = {
         "a": pick("a", 1.0 + 10.0 ** rng.uniform(-8.0, 4.0)),
         "b, c": pick("b, c", (b, rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6))),
@@ -126,7 +129,7 @@ def random_changes(rng):
         overlap = float(rng.choice([0.0, beta, 10.0 * beta, beta * 10.0 ** rng.uniform(-6, 2)]))
         formation = "population" if rng.random() < 0.3 else "individual"
         changes["heights"] = (alpha, float(beta), overlap, formation)
-    for key, least, most in (("yields at", -12.0, 3.0), ("wears over", -6.0, 3.0)):
+    for key, low, high in (("yields at", -12.0, 3.0), ("wears over", -6.0, 3.0)):
         if rng.random() < 0.3:
-            changes[key] = SCALE * unit * 10.0 ** rng.uniform(least, most)
+            changes[key] = SCALE * unit * 10.0 ** rng.uniform(low, high)
     return changes, SCALE * unit

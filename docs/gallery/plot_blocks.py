@@ -2,7 +2,8 @@ r"""
 Blocks in two dimensions
 ========================
 
-A block is pushed along its bed and lets go: pymunk moves it, every contact force is the law's.
+A block is pushed along its bed and back: pymunk integrates the motion, the law computes every
+contact force.
 """
 
 import matplotlib.pyplot as plt
@@ -53,22 +54,23 @@ record, summary = run(Simulation(parse(SCENE)))
 print(f"{summary['steps']} steps, energy balanced to {summary['largest_energy_error']:.0e}")
 
 # %%
-# The record holds the motion of all blocks, the energies, and the joints that the scene watches.
-# A direct shear test of the law alone, on the same path, draws the same curve: the blocks add
-# nothing of their own.
+# The record contains the motion of all blocks, the energies, and the joints that the scene
+# monitors. A direct shear test of the law alone, on the same path, gives the same curve: rigid
+# blocks add no compliance.
 
-slid = record.column("block: slid_m")
-shear, normal = record.column("block: shear_Pa"), record.column("block: normal_Pa")
+slip = record.column("block: slid_m")
+shear = record.column("block: shear_Pa")
+normal = record.column("block: normal_Pa")
 closure = record.column("block: closure_m")
-alone = jl.direct_shear(record.scene.laws["replica"].joint(), slid[1:], normal[0], steps=1)
+law_test = jl.direct_shear(record.scene.laws["replica"].joint(), slip[1:], normal[0], steps=1)
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
-left.plot(slid * 1e3, shear / 1e3, label="shear")
-left.plot(slid * 1e3, alone.shear_stress / 1e3, "k:", label="shear, the law alone")
-left.plot(slid * 1e3, normal / 1e3, "--", color="0.5", label="normal")
-left.set(xlabel="shear displacement (mm)", ylabel="stress on the joint (kPa)")
+figure, (stress_axes, dilation_axes) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
+stress_axes.plot(slip * 1e3, shear / 1e3, label="shear")
+stress_axes.plot(slip * 1e3, law_test.shear_stress / 1e3, "k:", label="shear, the law alone")
+stress_axes.plot(slip * 1e3, normal / 1e3, "--", color="0.5", label="normal")
+stress_axes.set(xlabel="shear displacement (mm)", ylabel="stress on the joint (kPa)")
 figure.legend(loc="outside upper center", ncols=3)
-right.plot(slid * 1e3, (closure[0] - closure) * 1e3, color="C2")
-right.plot(slid * 1e3, (alone.closure[0] - alone.closure) * 1e3, "k:")
-right.set(xlabel="shear displacement (mm)", ylabel="dilation (mm)")
+dilation_axes.plot(slip * 1e3, (closure[0] - closure) * 1e3, color="C2")
+dilation_axes.plot(slip * 1e3, (law_test.closure[0] - law_test.closure) * 1e3, "k:")
+dilation_axes.set(xlabel="shear displacement (mm)", ylabel="dilation (mm)")
 plt.show()

@@ -1,9 +1,9 @@
 r"""
-Direct shear: constant stress, constant stiffness
-=================================================
+Direct shear: CNL, CNS, constant closure
+========================================
 
-A joint that may rise dilates; one between stiff walls turns its dilation into normal stress and
-becomes stronger.
+At a constant normal load (CNL) a joint dilates freely. At a constant normal stiffness (CNS) of the
+surrounding rock dilation increases the normal stress, and the joint becomes stronger.
 """
 
 import math
@@ -15,17 +15,17 @@ import jointlaw as jl
 law = jl.presets.load("biegel-rough")
 
 # %%
-# The surroundings: a load that follows (constant stress), rock that yields by 1 µm per 20 MPa
-# (constant stiffness), or walls that do not move (constant closure).
+# The boundary conditions: a constant normal stress (CNL), rock that deforms by 1 µm per 20 MPa
+# (CNS), or rigid walls (constant closure).
 
-tests = {
-    "constant normal stress": 0.0,
-    "stiffness 2e13 Pa/m": 2e13,
+boundary_stiffness = {
+    "constant normal stress (CNL)": 0.0,
+    "stiffness 20 MPa/µm (CNS)": 2e13,
     "constant closure": math.inf,
 }
 records = {
     label: jl.direct_shear(law.joint(), 1e-6, normal=10e6, stiffness=stiffness, steps=120)
-    for label, stiffness in tests.items()
+    for label, stiffness in boundary_stiffness.items()
 }
 
 figure, axes = plt.subplots(2, 2, figsize=(7.5, 6.2), layout="constrained", sharex=True)
@@ -41,17 +41,17 @@ for axis, name in zip(axes.flat, names, strict=True):
     axis.set_ylabel(name)
 for axis in axes[1]:
     axis.set_xlabel("shear displacement (µm)")
-axes[0, 0].legend()
+figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
 plt.show()
 
 # %%
 for label, record in records.items():
     print(
-        f"{label:24s} largest friction angle {record.peak_friction_angle:.1f}°, "
+        f"{label:28s} largest friction angle {record.peak_friction_angle:.1f}°, "
         f"dilation angle {record.peak_dilation_angle:.1f}°, "
         f"shear stress {record.shear_stress[-1] / 1e6:.1f} MPa"
     )
 
 # %%
-# Dilation without end is a property of the paper's model, in which asperity pairs stay together for
-# ever; a mating length ends it (example *Mated, sheared, mated again*).
+# Unlimited dilation is a property of the paper's model, in which asperity pairs remain in contact
+# at any slip; a mating length limits it (example *Loss of interlock with slip*).

@@ -11,10 +11,9 @@ import numpy as np
 import jointlaw as jl
 
 # %%
-# A joint is described by what its asperities are made of (Hertz contacts of granite, 40 µm in
-# radius), which way they face (within 30° of the joint normal), how high they stand (4.8 ± 2.2 µm
-# below the highest, two faces that overlap by 2 µm when they are laid on each other), and how many
-# there are.
+# A joint is described by the stiffness and friction of its asperities (Hertz contacts of granite,
+# 40 µm in radius), their orientations (within 30° of the joint normal), their heights (4.8 ± 2.2 µm
+# below the highest, on two faces that overlap by 2 µm at first contact), and their density.
 
 law = jl.JointLaw(
     orientation=jl.Orientation(a=3.0),
@@ -24,15 +23,15 @@ law = jl.JointLaw(
 )
 
 # %%
-# The virgin curve needs no joint: it is a property of the law.
+# The first-loading curve needs no joint: it is a property of the law.
 
 closure = np.linspace(0.0, 0.25e-6, 200)
 stress = law.normal_stress(closure)
 at_10_MPa = law.closure(10e6)
 
 # %%
-# A joint has memory. ``C`` is the tangent of the step taken: closing gives the normal stiffness, a
-# first bit of shear of the closed joint its shear stiffness (``trial`` leaves the joint alone).
+# A joint is path-dependent. ``C`` is the tangent of the step: closing gives the normal stiffness, a
+# small step of shear of the closed joint its shear stiffness (``trial`` does not change the joint).
 
 joint = law.joint()
 F, C = joint.update([at_10_MPa, 0.0, 0.0])
@@ -48,6 +47,6 @@ axis.plot(closure * 1e6, stress / 1e6)
 axis.plot(at_10_MPa * 1e6, 10, "o")
 slope = np.array([-0.04, 0.04])
 axis.plot((at_10_MPa + slope * 1e-6) * 1e6, 10 + slope * C[0, 0] / 1e12, "--", label="tangent")
-axis.set(xlabel="closure (µm)", ylabel="normal stress (MPa)", title="Virgin closure curve")
+axis.set(xlabel="closure (µm)", ylabel="normal stress (MPa)", title="Closure under first loading")
 axis.legend()
 plt.show()

@@ -1,9 +1,10 @@
 r"""
-Mated, sheared, mated again
+Loss of interlock with slip
 ===========================
 
-Peak, dilation and residual belong together: friction is that of the asperities' faces plus the
-angle at which the joint rises. Away from the mated position both the rise and its strength fade.
+Post-peak softening: the friction angle is the friction angle of the asperities plus the dilation
+angle. With slip from the interlocked (mated) position the dilation decays, and the strength with
+it.
 """
 
 from dataclasses import replace
@@ -15,9 +16,10 @@ import jointlaw as jl
 
 # %%
 # A sandstone joint (profile JA of `the validation <../validation.html#peak-and-residual>`_), whose
-# slopes fade over a ``mating_length`` of 7.5 mm.
+# dilation decays over a ``mating_length`` of 7.5 mm.
 
-mu, length = 0.747, 7.46e-3
+mu = 0.747
+mating_length = 7.46e-3  # m
 law = jl.JointLaw(
     orientation=jl.Orientation(4.31),
     asperity=jl.Asperity(K=1.68e6, lam=1.17, eta=0.5, mu=mu),
@@ -25,13 +27,15 @@ law = jl.JointLaw(
     closure_range=1e-3,
     resolution=jl.Resolution(5, 3, 2),
     plane=0.0,
-    mating_length=length,
+    mating_length=mating_length,
 )
 phi_b = np.degrees(np.arctan(mu))
 stress = np.array([0.3, 1.0, 3.0, 10.0, 30.0])  # MPa
-tests = [jl.direct_shear(law.joint(), 20 * length, normal=1e6 * s, steps=2000) for s in stress]
+tests = [
+    jl.direct_shear(law.joint(), 20 * mating_length, normal=1e6 * s, steps=2000) for s in stress
+]
 peak = np.array([test.peak_friction_angle for test in tests])
-rise = np.array([test.dilation_angle[np.argmax(test.friction_angle)] for test in tests])
+dilation = np.array([test.dilation_angle[np.argmax(test.friction_angle)] for test in tests])
 residual = np.array([test.residual_friction_angle for test in tests])
 
 # %%
@@ -40,34 +44,36 @@ residual = np.array([test.residual_friction_angle for test in tests])
 
 decades = np.log10(60 / stress)
 JRC = decades @ (peak - phi_b) / (decades @ decades)
-for s, top, up, end in zip(stress, peak, rise, residual, strict=True):
-    print(f"{s:4g} MPa: peak {top:.1f}°, dilation {up:.1f}°, residual {end:.1f}°")
+for i, s in enumerate(stress):
+    print(
+        f"{s:4g} MPa: peak {peak[i]:.1f}°, dilation {dilation[i]:.1f}°, residual {residual[i]:.1f}°"
+    )
 
 # %%
-# Forward by ten mating lengths and back: the joint rises, and sinks to where it was. Slopes that
-# wear (``slope_wear``) rise less in every cycle.
+# Forward by ten mating lengths and back: the joint dilates, and closes to its first position. With
+# asperity degradation (``slope_wear``) it dilates less in every cycle.
 
-back = jl.direct_shear(law.joint(), [10 * length, 0.0], normal=1e6, steps=500)
-worn = replace(law, slope_wear=2e5)
-cycles = jl.direct_shear(worn.joint(), [5 * length, 0.0] * 7, normal=1e6, steps=150)
+round_trip = jl.direct_shear(law.joint(), [10 * mating_length, 0.0], normal=1e6, steps=500)
+degrading_law = replace(law, slope_wear=2e5)
+cycles = jl.direct_shear(degrading_law.joint(), [5 * mating_length, 0.0] * 7, normal=1e6, steps=150)
 
 figure, axes = plt.subplots(3, 1, figsize=(6, 10), layout="constrained")
 axes[0].semilogx(stress, peak, "o-", label="peak")
-axes[0].semilogx(stress, phi_b + rise, "s", mfc="w", label="faces + dilation at the peak")
+axes[0].semilogx(stress, phi_b + dilation, "s", mfc="w", label="asperities + dilation at the peak")
 axes[0].semilogx(stress, residual, "v-", label="residual, 20 mating lengths")
 axes[0].semilogx(stress, phi_b + JRC * decades, "--k", label=f"Barton-Bandis, JRC {JRC:.1f}")
 axes[0].set(xlabel="normal stress (MPa)", ylabel="friction angle (°)", ylim=(30, 68))
 axes[0].legend(loc="upper right")
 for axis, test, title in (
-    (axes[1], back, "forward and back"),
-    (axes[2], cycles, "seven cycles, slopes wear"),
+    (axes[1], round_trip, "forward and back"),
+    (axes[2], cycles, "seven cycles with asperity degradation"),
 ):
     axis.plot(1e3 * test.shear, 1e3 * (test.closure[0] - test.closure), "C2")
     axis.set(xlabel="shear displacement (mm)", ylabel="dilation (mm)", title=title)
 plt.show()
 
 # %%
-left = back.closure[0] - back.closure[-1]
-lift = [np.ptp(cycles.closure[300 * k : 300 * (k + 1)]) for k in range(7)]
-print(f"after ten mating lengths and back {1e6 * left:.1f} µm of the lift are left")
-print(f"lift in each cycle (mm): {np.round(1e3 * np.array(lift), 2)}")
+remaining = round_trip.closure[0] - round_trip.closure[-1]
+largest_dilation = [np.ptp(cycles.closure[300 * k : 300 * (k + 1)]) for k in range(7)]
+print(f"after ten mating lengths and back {1e6 * remaining:.1f} µm of the dilation remain")
+print(f"dilation in each cycle (mm): {np.round(1e3 * np.array(largest_dilation), 2)}")

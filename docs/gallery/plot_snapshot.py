@@ -1,8 +1,8 @@
 r"""
-Memory: snapshot, restore, save
-===============================
+Path dependence: snapshot, restore, checkpoint
+==============================================
 
-The traction depends on the way; a snapshot keeps all of it, in memory or in a file.
+The traction depends on the path; a snapshot contains the whole state, in memory or in a file.
 """
 
 import tempfile
@@ -17,7 +17,7 @@ law = jl.presets.load("westerly-rough")
 joint = law.joint()
 
 
-def walk(joint, *corners, steps=40):
+def follow(joint, *corners, steps=40):
     """Displacements and tractions along straight legs (m)."""
     rows = []
     for corner in corners:
@@ -29,17 +29,20 @@ def walk(joint, *corners, steps=40):
 
 
 # %%
-# The same displacement, reached on two ways: shear first or closure first.
+# The same displacement, reached on two paths: shear first or closure first.
 
 virgin = joint.snapshot()
-u, s = 0.2e-6, 0.15e-6
-closed_first = walk(joint, [u, 0, 0], [u, s, 0])
+u = 0.2e-6  # m, closure
+s = 0.15e-6  # m, shear
+closed_first = follow(joint, [u, 0, 0], [u, s, 0])
 joint.restore(virgin)
-sheared_first = walk(joint, [0.25 * u, 0, 0], [0.25 * u, s, 0], [u, s, 0])
-print("F at the same place:", closed_first[-1, 3:5] / 1e6, sheared_first[-1, 3:5] / 1e6, "MPa")
+sheared_first = follow(joint, [0.25 * u, 0, 0], [0.25 * u, s, 0], [u, s, 0])
+print(
+    "F at the same displacement:", closed_first[-1, 3:5] / 1e6, sheared_first[-1, 3:5] / 1e6, "MPa"
+)
 
 # %%
-# A step that was a mistake is taken back; a run is broken off and goes on from a file, to the bit.
+# A step is rejected and undone; a run is interrupted and restarted from a file, bitwise identical.
 
 before = joint.snapshot()
 joint.update([u, -s, 0.0])
@@ -47,18 +50,18 @@ joint.restore(before)
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "joint.npz"
     joint.snapshot().save(path)
-    again = law.joint()
-    again.restore(jl.load_state(path))
-unbroken = walk(joint, [u, -s, 0.0])
-resumed = walk(again, [u, -s, 0.0])
-print("largest difference of the resumed run:", np.abs(unbroken - resumed).max())
+    restarted = law.joint()
+    restarted.restore(jl.load_state(path))
+uninterrupted = follow(joint, [u, -s, 0.0])
+restarted_rows = follow(restarted, [u, -s, 0.0])
+print("largest difference of the restarted run:", np.abs(uninterrupted - restarted_rows).max())
 
 # %%
 figure, axis = plt.subplots(layout="constrained")
 for rows, label in (
     (closed_first, "closed, then sheared"),
     (sheared_first, "sheared, then closed"),
-    (unbroken, "back, after a snapshot"),
+    (uninterrupted, "reversed, after the snapshot"),
 ):
     axis.plot(rows[:, 1] * 1e6, rows[:, 4] / 1e6, label=label)
 axis.plot(closed_first[-1, 1] * 1e6, closed_first[-1, 4] / 1e6, "C0o")

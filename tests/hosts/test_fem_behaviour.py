@@ -42,7 +42,7 @@ def test_symbols_are_those_that_mgis_reads(
     lists = {
         "TangentOperatorBlocks": [force, gradient], "Gradients": [gradient],
         "ThermodynamicForces": [force], "MaterialProperties": properties,
-        "InternalStateVariables": [*(f"State{i}" for i in range(1, rows)), "Begun"],
+        "InternalStateVariables": [*(f"State{i}" for i in range(1, rows)), "Initialised"],
         "ExternalStateVariables": [], "Parameters": [], "InitializeFunctions": [],
         "PostProcessings": [],
     }  # fmt: skip
@@ -154,7 +154,7 @@ def test_what_k_asks_for(finite_elements):
 
 
 @pytest.mark.parametrize("name", ["rock", "rock_layer"])
-@pytest.mark.parametrize(("bad", "why"), [(np.nan, "finite"), (-1e300, "reach|finite")])
+@pytest.mark.parametrize(("bad", "why"), [(np.nan, "finite"), (-1e300, "admissible|finite")])
 def test_a_step_that_cannot_be_done_leaves_the_state_alone(finite_elements, capfd, name, bad, why):
     b = Behaviour(finite_elements, name, properties=[THICKNESS, YOUNG, POISSON])
     normal = 0 if name == "rock" else 2

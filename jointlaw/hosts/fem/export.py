@@ -10,33 +10,35 @@ from ...support.files import write_files
 from .. import DEFAULT_SEATING
 from ..c import export as c
 
-NORMAL = 2e6  # Pa: of the direct shear tests, or half of what the joint bears in its closure range
+MAX_TEST_STRESS = 2e6  # Pa: normal stress of the shear tests, at most
 
 
 def export_fem(
     law: Law, directory: str | Path, name: str = "joint", seating: float = DEFAULT_SEATING
 ) -> list[str]:
-    """Write all that a finite-element code needs to run this joint; the folder may be copied away.
+    """Write all files that a finite-element code needs to run this joint; the folder may be copied.
 
     >>> names = jl.export_fem(law, "joint-for-fem")
 
-    law: a law that shears; with a plane it is for 2-D alone. directory: made if missing; files of
-    the same names are replaced. name: of the behaviours, an identifier of C; NAME is a cohesive
-    zone, NAME_layer a thin layer of solid elements. seating: normal stress in Pa, > 0, of the
-    joint before the first step; its displacements count from there.
+    law: a law with shear; a law with a plane is for 2-D only. directory: created if missing; files
+    of the same names are replaced. name: of the behaviours, an identifier of C; NAME is a cohesive
+    zone, NAME_layer a thin layer of solid elements. seating: normal stress in Pa, > 0,
+    of the joint before the first step, from which displacements count.
 
     Writes `jointlaw.h` and `jointlaw.c` (the law), `NAME.h` (its tables), `jointlaw_fem.h`,
     `mgis.c` and `umat.c` with a `Makefile`, direct shear tests for OpenGeoSys and Kratos, and
-    `README.md`. Returns the names. Raises ValueError for a law, name or seating that does not
-    fit, before anything is written.
+    `README.md`. Returns the names. Raises ValueError for an invalid law, name or seating, before
+    anything is written.
     """
     if law.dim == 1:
-        raise ValueError("law.closure_only = True: finite elements shear; set closure_only=False")
+        raise ValueError(
+            "law.closure_only = True, but finite elements need shear: set closure_only=False"
+        )
     if number("seating", seating) <= 0.0:
         raise ValueError(
             f"seating = {seating:g} Pa is out of bounds: it must be > 0. A joint without stress "
-            "has no stiffness, so that under a given force the first step of Newton's method has "
-            "no end; take 10e3, or 1 where all displacements are given"
+            "has no stiffness, so Newton's method cannot start from it under a prescribed force; "
+            "take 10e3, or 1 if all displacements are prescribed"
         )
     c.require_name(name)
     texts = {
@@ -45,10 +47,10 @@ def export_fem(
         f"{name}.h": c.header_text(law, name),
     }
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
-    names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']
-    normal = min(NORMAL, 0.5 * float(law.normal_stress(law.closure_range)))
+    names = [f'"State{i}"' for i in range(1, len(start))] + ['"Initialised"']
+    normal = min(MAX_TEST_STRESS, 0.5 * float(law.normal_stress(law.closure_range)))
     shear = 5.0 * float(law.closure(normal))
-    marks = {  # what stands for the @WORDS@ of the files
+    values = {  # of the @WORDS@ in the files
         "DIM": str(law.dim),
         "STATE": str(len(start)),
         "NAMES": fill(", ".join(names), 96).replace("\n", " \\\n"),
@@ -60,11 +62,11 @@ def export_fem(
         "BACK": repr(shear / 2),
     }
     for file in sorted(Path(__file__).with_name("files").iterdir()):
-        # pip leaves a folder of compiled Python beside them
+        # pip adds a folder with compiled Python
         if file.is_file() and (law.dim == 3 or "3d" not in file.name):
             text = file.read_text(encoding="utf-8")
-            for mark, value in marks.items():
-                text = text.replace(f"@{mark}@", value)
+            for word, value in values.items():
+                text = text.replace(f"@{word}@", value)
             texts[file.name] = text.replace("granite", name)
     write_files(directory, texts)
     return list(texts)

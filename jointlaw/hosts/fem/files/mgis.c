@@ -1,13 +1,13 @@
-/* granite as two behaviours of MGIS, by MFront's generic interface but without MFront:
+/* granite as two behaviours of MGIS. They implement the generic interface of MFront, without MFront:
  *
- * granite        a cohesive zone: opening and sliding (m) to traction (Pa)
- * granite_layer  a layer of solid elements that stands for the joint: strain to stress. Its normal
- *                is z in space and y in a plane, axis 2 of the joint x. Material properties: the
- *                Thickness of the layer (m), YoungModulus (Pa) and PoissonRatio of the rock, by
- *                which it resists strain in its own plane. */
+ * granite        a cohesive zone: from opening and slip (m) to traction (Pa)
+ * granite_layer  a thin layer of solid elements in place of the joint: from strain to stress. The
+ *                normal is z in space and y in a plane, axis 2 of the joint is x. Material
+ *                properties: Thickness of the layer (m), and YoungModulus (Pa) and PoissonRatio
+ *                of its elastic response in the plane of the joint. */
 #include "jointlaw_fem.h"
 
-typedef struct { /* what MGIS hands over since 1.2.2 */
+typedef struct { /* arguments of a behaviour, as MGIS passes them since 1.2.2 */
   char *message; /* 512 bytes, or NULL */
   double dt, *K, *rdt, *speed_of_sound;
   const double *gradients0, *forces0, *density0, *properties0, *state0, *stored0, *dissipated0,
@@ -19,35 +19,35 @@ typedef struct { /* what MGIS hands over since 1.2.2 */
   const double *external;
 } jlf_view;
 
-enum { PREDICTION = -1, FORCES, TANGENT }; /* that K[0] asks for */
+enum { PREDICTION = -1, FORCES, TANGENT }; /* requests of K[0] */
 
-static int jlf_wanted(const jlf_view *v)
+static int jlf_request(const jlf_view *v)
 {
   return v->K[0] < -0.5 ? PREDICTION : v->K[0] > 0.5 ? TANGENT : FORCES;
 }
 
-static int jlf_refuse(const jlf_view *v, const char *why)
+static int jlf_fail(const jlf_view *v, const char *reason)
 {
-  if (v->message) snprintf(v->message, 512, "granite: %s", why);
-  fprintf(stderr, "granite: %s\n", why); /* OpenGeoSys does not show the message */
+  if (v->message) snprintf(v->message, 512, "granite: %s", reason);
+  fprintf(stderr, "granite: %s\n", reason); /* OpenGeoSys does not show the message */
   if (v->rdt) *v->rdt = 0.25; /* of the time step, for the next trial */
   return -1;
 }
 
-/* One step by du (m). A prediction is the tangent of the state as it is: nothing moves. */
+/* Advance the joint by du (m), or by zero for a prediction, the tangent of the present state */
 static int jlf_step(const jlf_view *v, const double du[3], double *s1, double *T, double *C)
 {
-  static const double still[3] = {0.0, 0.0, 0.0};
-  char why[JLAW_MESSAGE];
-  const int want = jlf_wanted(v);
-  if (v->K[0] > 50.0) return jlf_refuse(v, "a joint has no speed of sound: do not ask for it");
-  if (jlf_move(v->state0, s1, want == PREDICTION ? still : du, T, want ? C : NULL, why))
-    return jlf_refuse(v, why);
+  static const double zero[3] = {0.0, 0.0, 0.0};
+  char reason[JLAW_MESSAGE];
+  const int request = jlf_request(v);
+  if (v->K[0] > 50.0) return jlf_fail(v, "K[0] > 50 requests the speed of sound, which a joint does not have");
+  if (jlf_advance(v->state0, s1, request == PREDICTION ? zero : du, T, request ? C : NULL, reason))
+    return jlf_fail(v, reason);
   return 0;
 }
 
-/* Writes the new state, and energies (J/m2) over a thickness; 1 for success */
-static int jlf_keep(const jlf_view *v, const double *s1, double thickness, double elastic)
+/* Write the new state, and the energies (J/m2) divided by a thickness; returns 1, success */
+static int jlf_write_state(const jlf_view *v, const double *s1, double thickness, double elastic)
 {
   memcpy(v->state, s1, STATE * sizeof *s1);
   if (v->stored) *v->stored = jlaw_stored_energy(&JOINT, s1) / thickness + elastic;
@@ -58,18 +58,18 @@ static int jlf_keep(const jlf_view *v, const double *s1, double thickness, doubl
 static int jlf_cohesive(const jlf_view *v, int dim)
 {
   double du[3] = {0.0, 0.0, 0.0}, s1[STATE], T[3], C[9];
-  const int want = jlf_wanted(v);
+  const int request = jlf_request(v);
   for (int i = 0; i < dim; i++) du[i] = v->gradients[i] - v->gradients0[i];
   if (jlf_step(v, du, s1, T, C)) return -1;
-  for (int i = 0; want && i < dim * dim; i++) v->K[i] = C[DIM * (i / dim) + i % dim];
-  if (want == PREDICTION) return 1;
+  for (int i = 0; request && i < dim * dim; i++) v->K[i] = C[DIM * (i / dim) + i % dim];
+  if (request == PREDICTION) return 1;
   memcpy(v->forces, T, (size_t) dim * sizeof *T);
-  return jlf_keep(v, s1, 1.0, 0.0);
+  return jlf_write_state(v, s1, 1.0, 0.0);
 }
 
-/* Strains are xx yy zz xy xz yz, in a plane the first four; shear strains and shear stresses come
- * times sqrt 2, and slip is twice the thickness times the shear strain. In its own plane (x and b)
- * the layer is elastic, in plane stress, beside the joint. */
+/* Strains are xx yy zz xy xz yz, in a plane the first four, with shear components times sqrt 2; slip is
+ * twice the thickness times the shear strain. In the plane of the joint (components x and b) the layer
+ * is elastic, in plane stress, in parallel with the joint. */
 static int jlf_layer(const jlf_view *v, int dim)
 {
   const double root = 1.4142135623730951, *e = v->gradients, *p = v->properties;
@@ -77,31 +77,32 @@ static int jlf_layer(const jlf_view *v, int dim)
   const int space = dim == 3, size = space ? 6 : 4, b = space ? 1 : 2;
   const int at[3] = {space ? 2 : 1, space ? 4 : 3, 5}; /* opening and shears */
   const double by[3] = {h, h * root, h * root}, to[3] = {1.0, root, root};
-  double du[3] = {0.0, 0.0, 0.0}, s1[STATE], T[3], C[9], *s = v->forces, *K = v->K, far = 0.0;
-  const int want = jlf_wanted(v);
+  double du[3] = {0.0, 0.0, 0.0}, s1[STATE], T[3], C[9], *s = v->forces, *K = v->K, size_of_stress = 0.0;
+  const int request = jlf_request(v);
   if (!(h > 0.0 && h <= DBL_MAX && E >= 0.0 && P <= DBL_MAX && fabs(nu) <= 0.5))
-    return jlf_refuse(v, "Thickness must be > 0, YoungModulus >= 0, PoissonRatio from -0.5 to 0.5");
-  for (int i = 0; i < size; i++) far += (1.0 + P) * fabs(e[i]);
-  if (!(far <= DBL_MAX)) return jlf_refuse(v, "the strain is not finite; nothing was moved");
+    return jlf_fail(v, "Thickness must be > 0, YoungModulus >= 0, PoissonRatio from -0.5 to 0.5");
+  for (int i = 0; i < size; i++) size_of_stress += (1.0 + P) * fabs(e[i]);
+  if (!(size_of_stress <= DBL_MAX))
+    return jlf_fail(v, "the strain is not finite; the state is unchanged");
   for (int i = 0; i < dim; i++) du[i] = by[i] * (e[at[i]] - v->gradients0[at[i]]);
   if (jlf_step(v, du, s1, T, C)) return -1;
-  for (int i = 0; want && i < size * size; i++) K[i] = 0.0;
-  for (int i = 0; want && i < dim * dim; i++)
+  for (int i = 0; request && i < size * size; i++) K[i] = 0.0;
+  for (int i = 0; request && i < dim * dim; i++)
     K[size * at[i / dim] + at[i % dim]] = to[i / dim] * C[DIM * (i / dim) + i % dim] * by[i % dim];
-  if (want) {
+  if (request) {
     K[0] = K[size * b + b] = P;
     K[b] = K[size * b] = P * nu;
     if (space) K[size * 3 + 3] = G2;
   }
-  if (want == PREDICTION) return 1;
+  if (request == PREDICTION) return 1;
   for (int i = 0; i < dim; i++) s[at[i]] = to[i] * T[i];
   s[0] = P * (e[0] + nu * e[b]);
   s[b] = P * (e[b] + nu * e[0]);
   if (space) s[3] = G2 * e[3];
-  return jlf_keep(v, s1, h, 0.5 * (s[0] * e[0] + s[b] * e[b] + (space ? s[3] * e[3] : 0.0)));
+  return jlf_write_state(v, s1, h, 0.5 * (s[0] * e[0] + s[b] * e[b] + (space ? s[3] * e[3] : 0.0)));
 }
 
-/* The symbols by which MGIS knows a behaviour */
+/* Symbols that MGIS reads from the library of a behaviour */
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
 #elif defined(__GNUC__)
@@ -153,7 +154,7 @@ HYPOTHESIS(granite_layer, PlaneStrain, jlf_layer, 2)
 HYPOTHESIS(granite_layer, GeneralisedPlaneStrain, jlf_layer, 2)
 HYPOTHESIS(granite_layer, Axisymmetrical, jlf_layer, 2)
 
-#if DIM == 3 /* not for a law of one plane */
+#if DIM == 3 /* not for a law with a plane */
 HYPOTHESIS(granite, Tridimensional, jlf_cohesive, 3)
 HYPOTHESIS(granite_layer, Tridimensional, jlf_layer, 3)
 #endif

@@ -9,7 +9,7 @@
     datasets        tests in files: the data sets of the package (data/), and laboratory files
     envelopes       Coulomb, Barton and a power law fitted to the same tests
     problem         free and fixed parameters, initial values; least squares with priors
-    estimates       the result: law, intervals, parameters that are not identifiable
+    estimates       the result: law, intervals, parameters not identifiable
     fit             fit_curves; report and figure of the result
     field           a law from JRC, JCS, a friction angle and a stiffness
 

@@ -6,7 +6,7 @@
   refused.
 - **Normal stress.** If it varies by less than 5 %, its mean is used, otherwise the value of each
   row.
-- **Notes.** All changes to a record, and rows that are not used, are in the `notes` of its curve.
+- **Notes.** All changes to a record, and unused rows, are in the `notes` of its curve.
 """
 
 import re
@@ -157,7 +157,7 @@ def read_closure(
     decimal: decimal mark, "comma" or "point"; None detects it from the numbers of the file.
     outliers: "skip" or "keep" for rows that may be no measurement; None refuses them.
 
-    Returns stress (Pa), closure (m), (n,) each, and notes on rows that are not used. Raises
+    Returns stress (Pa), closure (m), (n,) each, and notes on unused rows. Raises
     ValueError naming file, column or line, and the command-line option that helps.
     """
     quantities = [(STRESS, stress), (CLOSURE, closure)]
@@ -339,7 +339,7 @@ def read_peaks(
     path, decimal, outliers: as in `read_closure`.
 
     Returns a `ShearCurve` of three points for each row. Raises ValueError as `read_closure`, and
-    for a row that is no such test or has an empty cell, naming its line.
+    for a row with another test or an empty cell, naming its line.
     """
     curves = []
     for table in read_tables(Path(path), [(quantity, None) for quantity in PEAKS], decimal):

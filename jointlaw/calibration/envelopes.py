@@ -10,7 +10,7 @@ from .measured import ShearCurve
 
 
 class Envelope(NamedTuple):
-    """An empirical strength envelope that is a straight line in transformed variables.
+    """An empirical strength envelope, a straight line in transformed variables.
 
     x: transform of the normal stress s.
     y: transform of normal stress and shear stress tau.

@@ -248,8 +248,8 @@ def fit_curves(
         adds its closure at preload, preload_closure (m). None fits asperity_density; with a closure
         curve alpha and beta, over cycles yield_interference too; with shear curves mu, a and
         mating_length.
-    fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
-    law: values of all parameters that are not free, `mating_length` among them; None takes rock
+    fixed: known values of other parameters, such as alpha from a scan, in SI units.
+    law: values of all fixed parameters, `mating_length` among them; None takes rock
         asperities, `forward.DEFAULT`, of "individual" formation. A law with a plane keeps it.
         Heights of another kind than GammaHeights, or none, are kept. Its bond keeps stiffnesses
         and, where cohesion or tension change, the ratio of each given energy to the elastic energy

@@ -33,9 +33,9 @@ INITIAL_STEPS = 30  # of a shear test; a fit doubles them while the results depe
 
 @dataclass(frozen=True)
 class Settings:
-    """Properties of a law that are not fitted.
+    """The fixed properties of a law.
 
-    law: all its parameters that are not fitted are used.
+    law: the values of its fixed parameters are used.
     resolution: of the law.
     closure_range: of the law, in m; None for its default.
     steps: steps of a whole shear test, see `ShearCurve.path`.

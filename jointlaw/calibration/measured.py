@@ -50,7 +50,7 @@ class ClosureCurve:
     cycle: True for whole cycles of loading, unloading and reloading in their order. Only a law with
         a yield_interference has a hysteresis loop to fit to them.
     compliance: of rock and machine, whose deformation the test measured too: closure per stress in
-        m/Pa. It is subtracted from `closure`; 0 if the closure is that of the joint alone.
+        m/Pa. It is subtracted from `closure`; 0 if the joint alone was measured.
     name, notes: name of the test in reports, and changes made to its record.
 
     `preload_closure` is the closure (m) of the law at the origin of the measured closure. It is
@@ -151,7 +151,7 @@ class ClosureCurve:
         Parameters
         ----------
         values: values of all parameters by name.
-        settings: properties of the law that are not fitted.
+        settings: fixed properties of the law.
         """
         model = log_stress(values, values["preload_closure"] + self.closure, settings)
         if not self.cycle:
@@ -316,7 +316,7 @@ class ShearCurve:
 
 
 def _expected_noise(name: str, known: float | None, default: Noise) -> Noise:
-    """The noise that is known, or the default to begin with."""
+    """The known noise, or the default to begin with."""
     return default if known is None else Noise(more_than(name, known, 0.0), 0.0, True)
 
 
@@ -403,7 +403,7 @@ def _log_slope(closure: Array, stress: Array) -> Array:
 def simulate_curves(
     curves: Sequence[ShearCurve], values: Values, settings: Settings
 ) -> list[SimulatedTest]:
-    """Simulate each test with the law of these values, with cells that are refined with the steps.
+    """Simulate each test with the law of these values, with cells refined with the steps.
 
     Otherwise the parameters would compensate the error of coarse cells, degrees of friction angle,
     which their intervals do not include.

@@ -71,10 +71,10 @@ class Problem:
     closure: the closure curve, or None.
     shears: the shear curves.
     free: names of the free parameters.
-    values: values of all parameters by name; those of the free ones are initial values.
+    values: values of all parameters by name; of the free ones, initial values.
     priors: centre and standard deviation of each prior by name, after the transform.
-    settings: properties of the law that are not fitted.
-    progress: a progress bar that advances with each law that is tried, or None.
+    settings: fixed properties of the law.
+    progress: a progress bar that advances with each law tried, or None.
 
     A vector x (p,) has the free parameters after their transforms, mostly logarithms.
     """
@@ -165,7 +165,7 @@ class Problem:
         return np.array(residuals)
 
     def residuals(self, x: Array, sigma: Array) -> Array:
-        """Residuals of the data over their standard errors, then those of the priors."""
+        """Residuals of the data over their standard errors, then residuals of the priors."""
         return np.concatenate([self.data(x) / sigma, self.prior(x)])
 
     def split(self, residuals: Array) -> list[Array]:
@@ -244,7 +244,7 @@ def _default_free(closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]
 def _finite_initial_value(
     name: str, closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]
 ) -> float:
-    """Initial value of a parameter that is infinite by default: half the range of the tests."""
+    """Initial value of a parameter with an infinite default: half the range of the tests."""
     if not shears or (closures and name == "yield_interference"):
         return 0.5 * max(float(np.ptp(curve.closure)) for curve in closures)
     if name == "slope_wear":
@@ -258,7 +258,7 @@ def _finite_initial_value(
 def starting_points(problem: Problem, has_law: bool) -> list[Array]:
     """Vectors to start from: the initial values, and for closure narrow to broad heights.
 
-    has_law: whether the initial values are those of a law and not the defaults.
+    has_law: whether the initial values come from a law instead of the defaults.
     """
     free = set(problem.free)
     values = problem.values
@@ -329,7 +329,7 @@ class Solution(NamedTuple):
     covariance: (p, p).
     noise: noise levels of each series.
     freedom: degrees of freedom from which the noise was estimated; infinite if it is known.
-    prior_share: (p,) share of the variance of each parameter that is due to the priors.
+    prior_share: (p,) share of the priors in the variance of each parameter.
     gain: (p, n) derivative of the parameters by the residuals.
     """
 

@@ -7,7 +7,7 @@ the message names the option of the command that decides. The reasons behind the
 - **Names.** A column is found by the aliases of its quantity, tried in order. If two columns have
   the same name, or none has a known one, the user names the column.
 - **Units** are part of the name ("tau [kPa]", "tau (kPa)", "tau /kPa", "tau in kPa", "tau_kPa") or
-  are in the next line. A column without a unit is refused: a stress in kPa that is read as MPa
+  are in the next line. A column without a unit is refused: a stress in kPa that was read as MPa
   gives a law, and no later check detects the error.
 - **Several tests.** A table ends where its line of names is repeated below it (`_split_stacked`),
   and is divided where its first name is repeated beside it (`_split_side_by_side`). A workbook has
@@ -15,7 +15,7 @@ the message names the option of the command that decides. The reasons behind the
 - **Outliers.** Data loggers write numbers such as -999 for a lost reading, repeat the last value,
   or produce single jumps; spreadsheets end with a summary row ("Max"). All of these are numbers,
   and fits would follow them. They are detected by three tests, each against the other values of the
-  column: a sentinel value that is far from the others; a jump that returns while another column
+  column: a sentinel value far from the others; a jump that returns while another column
   continues (`_find_jumps`); a word in a column of numbers. Because a real event may look the same,
   detected rows are refused until the user decides (`--outliers skip` or `keep`).
 - **Numbers.** Separators, decimal marks and thousands separators: `support.text_numbers`. Cells of
@@ -71,7 +71,7 @@ class Column(NamedTuple):
 
     title: as written in the file; name and unit: its two parts, unit "" if it has none.
     values: (n,), NaN where a cell is empty.
-    error: what is wrong with the first cell that is neither empty nor a number, or "".
+    error: the problem of the first cell that holds text instead of a number, or "".
     sentinels: lines whose value stands for a lost reading, such as -999, each with the reason.
     """
 
@@ -88,8 +88,8 @@ class Quantity(NamedTuple):
 
     description: of the quantity, in messages.
     si_unit: its unit in SI.
-    aliases: names of its column, tried in order; lower case, with _ for all characters that are
-        neither letters nor digits.
+    aliases: names of its column, tried in order; lower case, with _ for all characters
+        except letters and digits.
     option: the command-line option that names its column.
     ambiguous_aliases: names that count only if no other column has a unit of the same kind.
     """
@@ -107,7 +107,7 @@ class FileTable(NamedTuple):
     name: of file, sheet and test, in messages.
     columns: its columns.
     lines: line (or row) number of each value.
-    summary_rows: lines that are no measurement, such as "Max", each with the reason.
+    summary_rows: lines without a measurement, such as "Max", each with the reason.
     notes: on other contents of the file.
     """
 
@@ -209,7 +209,7 @@ class FileTable(NamedTuple):
         lines: Iterable[int],
         jumps: dict[int, str],
     ) -> tuple[list[int], list[str]]:
-        """The outliers among some lines that are to be left out, and a note on them.
+        """The outliers to leave out among some lines, and a note on them.
 
         Parameters
         ----------
@@ -480,5 +480,6 @@ def _split_title(title: str, unit: str) -> tuple[str, str]:
 
 
 def _normalised(name: str) -> str:
-    """A name in lower case with _ for all characters that are neither letters nor digits."""
+    """A name in lower case with _ for all characters
+    except letters and digits."""
     return re.sub(r"\W+", "_", name.strip().lower()).strip("_")

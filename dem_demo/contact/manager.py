@@ -6,7 +6,7 @@ together, and must never get the history of another one. Three ideas make this w
 Range. A corner may lie over the lines of several edges, and several corners of a block over the
 same edge. A contact is kept only where its corner is within its range on the edge. The range ends
 where the neighbour, the next corner or the next edge, is equally deep. So exactly one contact
-remains at each place, and blocks that overlap have a contact at the corner that is least deep.
+remains at each place, and blocks that overlap have a contact at the shallowest corner.
 
 Transfer. Contacts are not found anew in each step. When a corner leaves its range, the contact goes
 on to the corner or edge that comes next, and takes its joint with it: while a corner slides over an
@@ -116,7 +116,7 @@ class ContactManager:
     def update(self, motion: np.ndarray) -> None:
         """Update the contacts to a motion (6, blocks).
 
-        Corners that have left the range of their edge go on to what is next there.
+        Corners that have left the range of their edge go on to the next corner or edge.
         """
         arrays = self.contacts.step_arrays
         arrays.bind(motion=motion, needs_rebuild=self.needs_rebuild)
@@ -138,23 +138,23 @@ class ContactManager:
         pairs = pairs[~self.is_fixed[pairs].all(axis=1)]
         present = self.contacts
         searched = np.flatnonzero(has_moved[present.block_a] | has_moved[present.block_b])
-        found, edge_pairs = self._find(motion, pairs, present.codes[searched])
-        old_row = _match(found.codes, present.codes[searched], searched)
+        detected, edge_pairs = self._find(motion, pairs, present.codes[searched])
+        old_row = _match(detected.codes, present.codes[searched], searched)
         law = self.laws_of(edge_pairs)
         same_law = np.append(self.law, -1)[old_row] == law
-        stays = (old_row >= 0) & ((found.closure > 0) | same_law)
-        is_new = ~stays & (found.closure > -self._skin(found.block_a, found.block_b))
+        stays = (old_row >= 0) & ((detected.closure > 0) | same_law)
+        is_new = ~stays & (detected.closure > -self._skin(detected.block_a, detected.block_b))
         dropped = np.setdiff1d(searched, old_row[stays], assume_unique=True)
         rows = np.setdiff1d(np.arange(len(self.law)), dropped, assume_unique=True)
         if len(rows) == len(self.law) and not is_new.any():
             return rows
-        depth = np.maximum(found.closure[is_new], 0.0)
+        depth = np.maximum(detected.closure[is_new], 0.0)
         offset = 0.0 * depth if keep_closure else depth
         self.edge_pairs = np.concatenate([self.edge_pairs[rows], edge_pairs[is_new]])
         self.law = np.concatenate([self.law[rows], law[is_new]])
         self.closure_offset = np.concatenate([self.closure_offset[rows], offset])
-        corner = np.concatenate([present.corner[rows], found.corner[is_new]])
-        edge = np.concatenate([present.edge[rows], found.edge[is_new]])
+        corner = np.concatenate([present.corner[rows], detected.corner[is_new]])
+        edge = np.concatenate([present.edge[rows], detected.edge[is_new]])
         self.contacts = Contacts(self.outlines, corner, edge, motion)
         return np.concatenate([rows, np.full(len(offset), -1)])
 
@@ -184,8 +184,9 @@ class ContactManager:
         them, the block that comes first in the scene if both have one; the law of the joint set
         that cut both edges; the default of the scene.
         """
-        one, other = self._law_of_edge[edge_pairs].T
-        law = np.where((one == other) & (one >= 0), one, self._default_law)
+        first_law, second_law = self._law_of_edge[edge_pairs].T
+        is_joint = (first_law == second_law) & (first_law >= 0)
+        law = np.where(is_joint, first_law, self._default_law)
         blocks = self.outlines.block[edge_pairs]
         for sides, named, law_number in self._laws_of_blocks:
             law[(blocks[:, sides] == named).all(axis=1)] = law_number
@@ -197,7 +198,7 @@ class ContactManager:
         """Contacts between pairs (p, 2) of blocks, and the edges (k, 2) that meet there.
 
         known_codes: of existing contacts, which are preferred where two are equivalent. Raises
-        SceneError for an overlap that is too deep, or that no corner sees.
+        SceneError for an overlap beyond its limit, or seen by no corner.
         """
         p = len(pairs)
         pairs = np.ascontiguousarray(pairs, np.int64)
@@ -221,8 +222,8 @@ class ContactManager:
         np.maximum.at(deepest_seen, pair[in_range], candidates.closure[in_range])
         overlap = -separation.max(axis=0)
         self._require_seen(pairs, overlap, deepest_seen.reshape(2, p).max(axis=0), limit)
-        found = Contacts(self.outlines, corner[in_range], edge[in_range], motion)
-        return found, found.edge_pairs
+        detected = Contacts(self.outlines, corner[in_range], edge[in_range], motion)
+        return detected, detected.edge_pairs
 
     def _require_seen(
         self, pairs: np.ndarray, overlap: np.ndarray, seen: np.ndarray, limit: np.ndarray
@@ -236,17 +237,18 @@ class ContactManager:
         is_missed = is_checked & (seen < MIN_SEEN_FRACTION * overlap)
         if is_missed.any():
             p = int(is_missed.argmax())
-            one, other = (self.blocks[n].name for n in pairs[p])
+            name_a, name_b = (self.blocks[n].name for n in pairs[p])
             raise SceneError(
-                f"blocks {one!r} and {other!r} overlap by {overlap[p]:.3g} m where no corner is "
-                "over an edge that faces it: start the blocks apart, or resume with a smaller step"
+                f"blocks {name_a!r} and {name_b!r} overlap by {overlap[p]:.3g} m where no corner "
+                "is over an edge that faces it: start the blocks apart, or resume with a smaller "
+                "step"
             )
 
     def refuse_overlap(self, pair, depth: float) -> None:
         """Raise SceneError for an overlap (m) of two blocks beyond run.max_overlap."""
-        one, other = (self.blocks[n].name for n in pair)
+        name_a, name_b = (self.blocks[n].name for n in pair)
         raise SceneError(
-            f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below "
+            f"blocks {name_a!r} and {name_b!r} overlap by {depth:.3g} m: must stay below "
             f"{self.max_overlap[list(pair)].min():.3g} m (a share of the smaller block's width); "
             "draw them apart, resume with a smaller step, or use stiffer joints, lower loads or "
             "speeds, a larger run.corner_length or run.max_overlap"

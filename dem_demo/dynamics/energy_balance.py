@@ -43,7 +43,7 @@ class EnergyBalance:
     are related. start: the balance at time 0. forces (3, n, 3) in N: total, dashpots and drives at
     the end of the last step; previous_forces (2, n, 3): dashpots and drives one step before. area
     (k,) in m2: of the joints at the end of the last step; booked_dissipation (k,) in J/m2: their
-    dissipated energy that is in the balance. The compiled step writes all of these.
+    dissipated energy, as entered in the balance. The compiled step writes all of these.
     """
 
     def __init__(self, blocks: int) -> None:
@@ -66,7 +66,7 @@ class EnergyBalance:
     def change_loads(self, blocks: Blocks, change: np.ndarray, dt: float) -> None:
         """Correct the work of loads that change by `change` (n, 3) within a step dt (s).
 
-        The step adds the work of the new loads; by the trapezoidal rule it is that of the mean.
+        The step adds the work of the new loads; the trapezoidal rule takes their mean.
         """
         self.energy[WORK] -= 0.5 * dt * (change * blocks.motion[3:].T).sum()
 

@@ -56,7 +56,7 @@ REGULARISATION = 1e-9  # of the least damping, so that free blocks give no singu
 # Viscous relaxation; drags are relative to the median stiffness
 MAX_RELAXATION_STEPS = 40
 DRAG_DECREASE = 0.1  # factor of the drag after a step
-DRAG_INCREASE = 10.0  # factor after a step that was not found
+DRAG_INCREASE = 10.0  # factor after a step that did not converge
 WEAK_DRAG = 2e-3  # from here on an unbalanced force that does not fall is judged as lasting
 WEAK_DRAG_REPEATED = 1e-1  # the same where the last two steps had one drag
 LASTING_RATIO = 0.8  # unbalanced force relative to the step before, with less drag
@@ -171,21 +171,21 @@ class EquilibriumSearch:
         residual = np.inf
         has_moving = (unstable & np.logical_not(fixed)).any()
         for _ in range(MAX_RELEASE_STEPS if has_moving else 1):
-            moved, unbalanced, found = self._step(y, min_drag)
-            y = np.where(found, moved, y)
+            solution, unbalanced, converged = self._step(y, min_drag)
+            y = np.where(converged, solution, y)
             previous_residual = residual
             residual = np.linalg.norm(unbalanced)
-            if not found.all() or residual > MIN_RELEASE_RATIO * previous_residual:
+            if not converged.all() or residual > MIN_RELEASE_RATIO * previous_residual:
                 break
-        if found.all():
-            return moved, self._find_followers(moved, unstable, min_drag)
-        min_drag = np.where(found, FIXING_DRAG, min_drag)
+        if converged.all():
+            return y, self._find_followers(y, unstable, min_drag)
+        min_drag = np.where(converged, FIXING_DRAG, min_drag)
         relaxed, unbalanced = self._relax(y, min_drag)
         ratio = self._ratio(np.where(min_drag > 0, 0.0, unbalanced))
         if ratio.max() <= MAX_UNBALANCED_RATIO:
             # at rest, or still creeping?
-            y, _, found = self._step(relaxed, min_drag)
-            if found.all():
+            y, _, converged = self._step(relaxed, min_drag)
+            if converged.all():
                 return y, np.zeros_like(unstable)
         return relaxed, ratio > min(UNSTABLE_RATIO, 0.5 * ratio.max())
 
@@ -201,8 +201,8 @@ class EquilibriumSearch:
         drag = np.where(min_drag < FIXING_DRAG, weak_drag, FIXING_DRAG)
         has_moving = ((min_drag > 0) & (min_drag < FIXING_DRAG)).any()
         for _ in range(FOLLOWER_STEPS if has_moving else 0):
-            y, unbalanced, found = self._step(y, drag, STEP_TOLERANCE)
-            if not found.all():
+            y, unbalanced, converged = self._step(y, drag, STEP_TOLERANCE)
+            if not converged.all():
                 break
             ratio = self._ratio(np.where(drag < FIXING_DRAG, unbalanced, 0.0)) * ~unstable
         return ratio > UNSTABLE_RATIO
@@ -219,11 +219,11 @@ class EquilibriumSearch:
         """First guess (m,): displacements if no joint can slide.
 
         One step through a drag with which a free block falls by a tenth of its radius. Zero in
-        islands where the step is not found.
+        islands where the step does not converge.
         """
         drag = self.drag_of_radius / PREDICTOR_FALL + self.zero
-        y, _, found = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
-        return y * found
+        y, _, converged = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
+        return y * converged
 
     def _median_stiffness(self, y: np.ndarray) -> float:
         """Median stiffness of the free motions at displacements y (m,), in 1/s2."""
@@ -243,13 +243,15 @@ class EquilibriumSearch:
         unbalanced = self.zero
         previous_ratio: np.ndarray | float = np.inf
         for _ in track(range(MAX_RELAXATION_STEPS), "looking for unstable blocks"):
-            moved, residual, found = self._step(y, np.maximum(drag, min_drag), STEP_TOLERANCE)
-            if not found.all():
+            solution, residual, converged = self._step(
+                y, np.maximum(drag, min_drag), STEP_TOLERANCE
+            )
+            if not converged.all():
                 drag = drag * DRAG_INCREASE
                 change = 1.0
                 previous_ratio = np.inf
                 continue
-            y = moved
+            y = solution
             unbalanced = residual
             ratio = self._ratio(np.where(min_drag > 0, 0.0, unbalanced))
             is_repeated = change == 1.0
@@ -288,7 +290,7 @@ class EquilibriumSearch:
         """One implicit step from y (m,) through a drag (m,); without drag, to the equilibrium.
 
         Newton's method, with damping where the residual does not fall, in each island by itself.
-        Returns displacements (m,), unbalanced forces (m,), and whether the step was found in the
+        Returns displacements (m,), unbalanced forces (m,), and whether the step converged in the
         island of each motion (m,).
         """
         island = self.island
@@ -369,9 +371,9 @@ def _in_situ_stress(scene: Scene, contacts: Contacts) -> np.ndarray:
     q)/3.
     """
     stress = scene.in_situ
-    ahead, behind = contacts.overlap_length
+    toward_end, toward_start = contacts.overlap_length
     length = np.maximum(contacts.length, 1e-300)
-    shift = 2 / 3 * (ahead**2 - behind**2) / length * contacts.edge_direction
+    shift = 2 / 3 * (toward_end**2 - toward_start**2) / length * contacts.edge_direction
     at = contacts.position + shift
     depth = np.maximum(stress.signed(at), 0.0)
     on_joint = depth * stress.on(contacts.normal) * contacts.normal.conj()
@@ -393,8 +395,8 @@ def _displacement_at_stress(joints: Joints, stress: np.ndarray) -> np.ndarray:
     for trial in range(1, MAX_TRIALS + 1):
         F, C, _ = joints.trial(d)
         missing = stress - F
-        is_found = (np.abs(missing) <= STRESS_TOLERANCE * stress[:, :1]).all(axis=1)
-        if is_found.all() or trial == MAX_TRIALS:
+        converged = (np.abs(missing) <= STRESS_TOLERANCE * stress[:, :1]).all(axis=1)
+        if converged.all() or trial == MAX_TRIALS:
             break
         normal_stiffness = np.maximum(C[:, 0, 0], 1e-300)
         # slope of the shear stress at constant normal stress
@@ -402,13 +404,13 @@ def _displacement_at_stress(joints: Joints, stress: np.ndarray) -> np.ndarray:
         min_slope = np.maximum(min_slope, MIN_SLOPE * slope)
         coupled = C[:, 1, 0] / normal_stiffness * missing[:, 0]
         shear_step = (missing[:, 1] - coupled) / np.maximum(slope, min_slope)
-        shear_step[is_found] = 0.0
+        shear_step[converged] = 0.0
         closure_step = (missing[:, 0] - C[:, 0, 1] * shear_step) / normal_stiffness
         closure = np.maximum(d[:, 0] + closure_step, 0.1 * d[:, 0])
         d = np.stack([closure, d[:, 1] + shear_step], axis=1)
         if trial == 1:
             first_step = d
-    return np.where(is_found[:, None], d, first_step)
+    return np.where(converged[:, None], d, first_step)
 
 
 def settle(
@@ -417,21 +419,21 @@ def settle(
     """Move the blocks to their static equilibrium.
 
     sliding (k,) in m: with which the joints start at the places as drawn. Returns the sliding with
-    which they start at the places found. Unstable blocks stay almost where they are drawn; the
+    which they start at equilibrium. Unstable blocks stay almost where they are drawn; the
     others are in equilibrium with the forces that the unstable ones exert on them there.
     """
     unstable = np.zeros(len(blocks.is_free), bool)
     first_displacement = 0.0
     pairs = blocks.neighbour_pairs()
-    for again in range(MAX_ROUNDS):  # each at the places just found: joints rotate with the blocks
+    for n_round in range(MAX_ROUNDS):  # each at the last places: joints rotate with the blocks
         manager.update(blocks.motion)
         manager.needs_rebuild[:] = True  # cheap here, and no contact is missed
         old_row = manager.rebuild(blocks.motion, pairs)
         joints.rearrange(old_row, manager.law, manager.edge_pairs)
         sliding = np.append(sliding, 0.0)[old_row]
         apply_loads(scene, blocks, manager)
-        search = EquilibriumSearch(scene, blocks, manager, joints, sliding, again > 0)
-        is_near = again or scene.in_situ is not None
+        search = EquilibriumSearch(scene, blocks, manager, joints, sliding, n_round > 0)
+        is_near = n_round or scene.in_situ is not None
         guess = search.zero if is_near else search.stick_predictor()
         known_unstable = unstable
         displacement, new_unstable = search.solve(guess, unstable, known_unstable)
@@ -444,7 +446,7 @@ def settle(
         is_stable = ~unstable[search.block]
         largest = np.abs(displacement[is_stable]).max(initial=0.0)
         first_displacement = first_displacement or largest
-        if again and largest <= SETTLED_RATIO * first_displacement:
+        if n_round and largest <= SETTLED_RATIO * first_displacement:
             break
     manager.rebuilt_at[:] = blocks.motion[:3]
     return sliding
@@ -455,7 +457,7 @@ def equilibrium_displacements(
 ) -> np.ndarray | None:
     """Displacements (m,) of the free motions at which virgin joints carry a scene as drawn.
 
-    Scaled by the square root of the inertia; None if no equilibrium is found. All loads act at
+    Scaled by the square root of the inertia; None without an equilibrium. All loads act at
     once. guess: displacements of a similar scene. The search starts from it, and from the stick
     predictor: where bonds break and joints soften, one may find an equilibrium that the other
     misses. unstable (n,): blocks that need no equilibrium.

@@ -93,7 +93,7 @@ class Simulation:
     stage_start_times (stages,): when the stages of the excavation began (s), infinite before.
 
     Where neither `step` nor the scene sets the time step, it is halved when joints close too far
-    for it, or blocks become too fast. Raises ValueError for a step that is not a finite number > 0
+    for it, or blocks become too fast. Raises ValueError unless the step is a finite number > 0
     and for a state of another scene, SceneError for an initial state that the method cannot treat.
     """
 
@@ -480,7 +480,7 @@ class Simulation:
 def _read_state(file: Path) -> tuple[int, Scene | None, SavedState]:
     """Version, scene and state of a file; no scene for another version than `VERSION`."""
     # ZIP files have checksums. Opened here, because numpy leaves a damaged file open.
-    with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
+    with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
         data = {name: stored[name] for name in stored.files}
     version = int(data["version"])
     if version != VERSION:

@@ -1,10 +1,10 @@
 """Largest stable time step, from the eigenvalues of the assembled stiffness and dashpots.
 
 Symplectic Euler with dashpots that lag by half a step is stable while the largest eigenvalue of
-dt^2 K + 2 dt C, relative to the mass matrix, stays below 4. For one oscillator that is
+dt^2 K + 2 dt C, relative to the mass matrix, stays below 4. For one oscillator it means
 dt < (2/omega)(sqrt(1 + zeta^2) - zeta). K holds every contact at its place, so rocking is included.
 
-Each block alone gives a bound that is cheap to compute. The eigenvalues of the whole scene are
+Each block alone gives a cheap bound. The eigenvalues of the whole scene are
 computed only where the bound does not suffice, or falls.
 """
 
@@ -100,7 +100,7 @@ def _spring_sums(block: np.ndarray, at: np.ndarray, springs: np.ndarray, n: int)
 def _largest_eigenvalue(sums: np.ndarray, inverse_sqrt_inertia: np.ndarray) -> float:
     """Largest eigenvalue of any single block (n,) on springs that act in all directions.
 
-    sums (4, n): of `_spring_sums`; inverse_sqrt_inertia (n, 3): zero for motions that are not free.
+    sums (4, n): of `_spring_sums`; inverse_sqrt_inertia (n, 3): zero for prescribed motions.
     """
     k, kx, ky, k_rotation = sums
     zero = np.zeros_like(k)
@@ -142,16 +142,18 @@ def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> f
 def opening_and_sliding_rates(blocks: Blocks, contacts: Contacts) -> csr_array:
     """Matrix (2 k, free motions) from motions of the blocks to the rates of the contacts.
 
-    Opening rates (k,) along the normal, then sliding rates (k,), for motions that are scaled by the
+    Opening rates (k,) along the normal, then sliding rates (k,), for motions scaled by the
     square root of their inertia.
     """
     k = len(contacts.closure)
     block = np.concatenate([contacts.block_a, contacts.block_b])
     arm = np.tile(contacts.position, 2) - (blocks.motion[0] + 1j * blocks.motion[1])[block]
     directions = np.tile([contacts.normal, -1j * contacts.normal], 2)
-    way = np.repeat([-1.0, 1.0], k) * directions
-    rotation = (arm.conj() * way).imag
-    entries = np.stack([way.real, way.imag, rotation], axis=2) * blocks.inverse_sqrt_inertia[block]
+    signed = np.repeat([-1.0, 1.0], k) * directions
+    rotation = (arm.conj() * signed).imag
+    entries = (
+        np.stack([signed.real, signed.imag, rotation], axis=2) * blocks.inverse_sqrt_inertia[block]
+    )
     row = np.tile(np.arange(2 * k).reshape(2, k), 2)[:, :, None]
     column = 3 * block[:, None] + np.arange(3)
     places = tuple(place.ravel() for place in np.broadcast_arrays(row, column))
@@ -199,8 +201,8 @@ def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: fl
     """Step limit (s) if every block were touched along its whole outline; infinite where forces
     move no block.
 
-    stiffness (Pa/m): of the joints. Half of every edge acts at either end, or half a corner length
-    if that is larger; twice as stiff, as in `bound_of_blocks`, for any contacts between blocks.
+    stiffness (Pa/m): of the joints. Half of every edge acts at either end, or half a corner length,
+    whichever is larger; twice as stiff, as in `bound_of_blocks`, for any contacts between blocks.
     """
     length = np.maximum(outlines.edge_length, outlines.corner_length)
     springs = stiffness * scene.thickness * length  # twice a half

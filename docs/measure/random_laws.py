@@ -24,14 +24,14 @@ import numpy as np
 from common import print_table, run_command
 
 import jointlaw as jl
-from jointlaw.accuracy.slip import LEG, random_ways, slip
+from jointlaw.accuracy.slip import STEPS_PER_LEG, random_slip_tests, run_slip_tests
 from jointlaw.accuracy.suite import (
     Suite,
-    errors,
-    far_path,
+    limit_friction_angle,
+    random_slip_path,
     reference_resolution,
-    scaled,
-    steepest,
+    relative_errors,
+    scale_resolution,
     tractions,
 )
 from jointlaw.support.progress import track
@@ -44,7 +44,7 @@ PATH_STEPS = 160
 
 TOLERANCES = (0.05, 0.01, 0.003)
 SMALL_A = 1.4  # laws with a smaller a are reported separately
-JAMMING_ANGLE = 88.0  # deg, of the steepest asperity: no slip at constant normal stress beyond it
+JAMMING_ANGLE = 88.0  # deg, of `limit_friction_angle`: a law with more slips without end
 PATH_RANGES = (1.0, 0.3, 0.1, 0.03, 0.01)  # closure ranges
 
 MATING_RATIOS = (1.0, 3.0, 10.0, 30.0, 100.0, 1000.0, math.inf)  # mating length / closure range
@@ -79,7 +79,9 @@ def random_paths(law, rng):
     """Increments (PATH_STEPS, paths, dim) in m."""
     path_fraction = np.arange(1, PATH_STEPS + 1) / PATH_STEPS
     stress = float(law.normal_stress(law.closure_range))
-    long_slip = [far_path(law, rng, stress / 2, path_fraction) for _ in range(LONG_SLIP_PATHS)]
+    long_slip = [
+        random_slip_path(law, rng, stress / 2, path_fraction) for _ in range(LONG_SLIP_PATHS)
+    ]
     straight = [straight_path(law, rng, stress, path_fraction) for _ in range(STRAIGHT_PATHS)]
     smooth = [smooth_path(law, rng, stress) for _ in range(SMOOTH_PATHS)]
     positions = np.stack([*straight, *smooth, *long_slip], axis=1)[:, :, : law.dim]
@@ -155,11 +157,11 @@ def tolerance(laws=100, seed=1, plane=False):
 def tolerance_results(law, rng):
     """For each tolerance: errors of the paths over it, sliders, seconds; None if refused."""
     increments = random_paths(law, rng)
-    reference = replace(law, resolution=scaled(reference_resolution(law), 2.0))
+    reference = replace(law, resolution=scale_resolution(reference_resolution(law), 2.0))
     stress = float(law.normal_stress(law.closure_range)) / 2
-    directions = random_ways(rng, CONSTANT_STRESS_PATHS, law.dim)
+    directions = random_slip_tests(rng, CONSTANT_STRESS_PATHS, law.dim)
     slide = partial(slip_at_stress, law.closure_range, stress, directions)
-    reference_slip = slide(reference) if steepest(law) < JAMMING_ANGLE else None
+    reference_slip = slide(reference) if limit_friction_angle(law) < JAMMING_ANGLE else None
     suite = Suite((), increments, tractions(reference, increments), reference_slip, slide,
                   uncertainty=np.zeros(0))  # fmt: skip
     results = []
@@ -171,14 +173,14 @@ def tolerance_results(law, rng):
             results.append(None)
             continue
         seconds = time.process_time() - start
-        relative_errors = suite.miss(adapted).largest / tolerance
+        relative_errors = suite.errors(adapted).traction / tolerance
         results.append((relative_errors, adapted.tables.sliders, seconds))
     return results
 
 
 def slip_at_stress(closure_range, stress, directions, law):
     """Slip of a law along the directions at a normal stress (Pa)."""
-    return slip(law, closure_range, stress, directions)
+    return run_slip_tests(law, closure_range, stress, directions)
 
 
 def tolerance_rows(results, group):
@@ -230,10 +232,10 @@ def small_load_errors(law):
     for path_range in PATH_RANGES:
         limited = replace(law, closure_range=path_range * law.closure_range)
         increments = random_paths(limited, np.random.default_rng(0))
-        finest = replace(limited, resolution=scaled(reference_resolution(limited), 1.2))
+        finest = replace(limited, resolution=scale_resolution(reference_resolution(limited), 1.2))
         reference = tractions(finest, increments)
         for name, variant in variants.items():
-            largest = errors(tractions(variant, increments), reference).max()
+            largest = relative_errors(tractions(variant, increments), reference).max()
             results[name].append(100.0 * largest)
     return results
 
@@ -286,12 +288,12 @@ def angle_errors(law):
     for j, ratio in enumerate(MATING_RATIOS):
         variant = replace(law, mating_length=ratio * closure_range)
         finest = replace(variant, resolution=FINEST)
-        reference = slip(finest, closure_range, stress, directions)
-        forward = reference.counts & (np.arange(2 * LEG) < LEG)[:, None]
-        back = reference.counts & ~forward
+        reference = run_slip_tests(finest, closure_range, stress, directions)
+        forward = reference.is_mobilised & (np.arange(2 * STEPS_PER_LEG) < STEPS_PER_LEG)[:, None]
+        back = reference.is_mobilised & ~forward
         for i, name in enumerate(NAMED_RESOLUTIONS):
             coarse = replace(variant, resolution=name)
-            result = slip(coarse, closure_range, stress, directions)
+            result = run_slip_tests(coarse, closure_range, stress, directions)
             friction = np.abs(result.friction - reference.friction)
             dilation = np.abs(result.dilation - reference.dilation)[forward]
             results[i, j] = (friction[forward].max(), friction[back].max(),

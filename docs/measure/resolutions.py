@@ -50,7 +50,7 @@ def named():
         for name, resolution in NAMED.items():
             variant = replace(law, resolution=resolution)
             sliders[name] = max(sliders[name], variant.tables.sliders)
-            errors.append(f"{100 * suite.miss(variant).largest.max():.2f}")
+            errors.append(f"{100 * suite.errors(variant).traction.max():.2f}")
         rows.append([preset, *errors])
     print_table(["preset", *NAMED], [*rows, ["sliders, at most", *sliders.values()]])
 
@@ -64,14 +64,23 @@ def cost_list():
     os.environ["JOINTLAW_THREADS"] = "1"
     tradeoff = replace(jl.presets.load("westerly-smooth"), plane=0.0).tradeoff()
     names = {resolution: f"{name}: " for name, resolution in tradeoff.named.items()}
-    selected = {price.resolution for price in tradeoff.frontier()} | set(names)
+    selected = {cost.resolution for cost in tradeoff.pareto_front()} | set(names)
     rows = []
-    for price in sorted(tradeoff.rows, key=lambda price: price.sliders):
-        r = price.resolution
+    for cost in sorted(tradeoff.rows, key=lambda cost: cost.sliders):
+        r = cost.resolution
         if r in selected:
-            rows.append([f"{names.get(r, '')}{r.u}, {r.phi}, {r.depth}", price.sliders, price.bytes,
-                         f"{price.worst:.2%}", f"{price.friction:.2f}°", f"{price.dilation:.2f}°",
-                         f"{price.ns:.0f}", f"{price.ns_tangent:.0f}"])  # fmt: skip
+            rows.append(
+                [
+                    f"{names.get(r, '')}{r.u}, {r.phi}, {r.depth}",
+                    cost.sliders,
+                    cost.bytes_per_joint,
+                    f"{cost.max_error:.2%}",
+                    f"{cost.friction_error:.2f}°",
+                    f"{cost.dilation_error:.2f}°",
+                    f"{cost.update_ns:.0f}",
+                    f"{cost.tangent_update_ns:.0f}",
+                ]
+            )
     print_table(["`Resolution`", "sliders", "bytes", "error", "friction", "dilation", "ns",
                  "with tangent"], rows)  # fmt: skip
 

@@ -1,1 +1,1 @@
-"""How accurate a resolution is: the standard paths, the price list, and the law for a tolerance."""
+"""Accuracy of resolutions: standard paths, cost and error, the law for a tolerance."""

@@ -1,8 +1,9 @@
-"""Slip far beyond the closure: friction and dilation angle at constant normal stress.
+"""Shear tests with slip far beyond the closure: friction and dilation angle at constant stress.
 
-The joint is seated and sheared to several mating lengths (without one to 30 closure ranges), and
-back by as much. The normal stress is held for every resolution by itself: one and the same path of
-displacement would compare their dilation, summed up over the slip, and not their strength.
+The joint is loaded to a normal stress and sheared to several mating lengths (without a mating
+length to 30 closure ranges), and back. Each resolution controls the normal stress by itself: one
+common path of displacement would compare the accumulated dilation of resolutions, not their
+strength.
 """
 
 import math
@@ -14,74 +15,97 @@ from numpy.typing import NDArray
 from ..joints.normal_control import NormalCondition, closing_increments
 from ..support.checks import Array
 
-JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
+JointLaw: TypeAlias = Any  # of jointlaw.laws, which imports this package
 
-LEG = 24  # steps each way
-SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
-DIRECTIONS = (0.0, 25.0, 90.0)  # degrees, in space
-MOBILISED = 0.2  # of a mating length, or without one of 10 closure ranges: friction from there on
-_FIRST = 0.1  # first step, in closure ranges
-_FAR, _ENDLESS = 3.0, 30.0  # mating lengths; closure ranges without one
-HELD = 1e-5  # of the normal stress
+STEPS_PER_LEG = 24  # forwards, and as many back
+STRESS_TOLERANCE = 1e-5  # relative, of the constant normal stress
+_STRESS_FRACTIONS = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
+_AZIMUTHS = (0.0, 25.0, 90.0)  # degrees, in 3-D
+# Friction is mobilised from here on, over a mating length, or over 10 closure ranges without one
+_MOBILISED_SLIP = 0.2
+_FIRST_STEP = 0.1  # closure ranges
+_MAX_SLIP_OVER_MATING_LENGTH = 3.0
+_MAX_SLIP_OVER_CLOSURE_RANGE = 30.0  # without a mating length
 
 
-class Slip(NamedTuple):
-    """F (steps, paths, dim) in Pa, and friction and dilation angle (steps, paths) in degrees.
+class SlipResults(NamedTuple):
+    """Results of shear tests, by step and test.
 
-    `counts` (steps, paths): whether friction is mobilised: beyond 0.2 mating lengths, and on the
-    way back beyond its first fifth and two closure ranges, within which sliders still turn.
+    F: (steps, tests, dim) in Pa.
+    friction, dilation: angles (steps, tests) in degrees.
+    is_mobilised: (steps, tests), whether friction is mobilised: beyond 0.2 mating lengths, and on
+        the way back beyond its first fifth and two closure ranges, within which sliders still turn.
     """
 
     F: Array
     friction: Array
     dilation: Array
-    counts: NDArray[np.bool_]
+    is_mobilised: NDArray[np.bool_]
 
-    def apart(self, other: "Slip") -> list[float]:
+    def largest_differences(self, reference: "SlipResults") -> list[float]:
         """Largest difference of the friction and of the dilation angle, in degrees."""
-        off = np.abs([self.friction - other.friction, self.dilation - other.dilation])
-        return off.max(axis=(1, 2), where=self.counts, initial=0.0).tolist()
+        differences = np.abs(
+            [self.friction - reference.friction, self.dilation - reference.dilation]
+        )
+        return differences.max(axis=(1, 2), where=self.is_mobilised, initial=0.0).tolist()
 
 
-def distance(mating_length: float, closure_range: float) -> float:
-    """How far (m) the paths that slip go."""
+def max_slip(mating_length: float, closure_range: float) -> float:
+    """Slip (m) at which the tests reverse."""
     if math.isfinite(mating_length):
-        return _FAR * mating_length
-    return _ENDLESS * closure_range
+        return _MAX_SLIP_OVER_MATING_LENGTH * mating_length
+    return _MAX_SLIP_OVER_CLOSURE_RANGE * closure_range
 
 
-def standard_ways(dim: int) -> Array:
-    """Ways (paths, 3) to slip: share of the stress S/2, azimuth in degrees, share of `distance`."""
-    azimuths = DIRECTIONS if dim == 3 else DIRECTIONS[:1]
-    return np.array([(share, azimuth, 1.0) for share in SHARES for azimuth in azimuths])
+def standard_slip_tests(dim: int) -> Array:
+    """Tests (n, 3): fraction of the stress S/2, azimuth in degrees, fraction of `max_slip`."""
+    azimuths = _AZIMUTHS if dim == 3 else _AZIMUTHS[:1]
+    return np.array(
+        [(fraction, azimuth, 1.0) for fraction in _STRESS_FRACTIONS for azimuth in azimuths]
+    )
 
 
-def random_ways(rng: np.random.Generator, count: int, dim: int) -> Array:
-    """As `standard_ways`, anywhere: at stresses from a twentieth of S/2 on."""
-    share, azimuth = rng.uniform(0.05, 1.0, count), rng.uniform(0.0, 360.0, count)
-    return np.column_stack([share, azimuth * (dim == 3), rng.uniform(0.3, 1.0, count)])
+def random_slip_tests(rng: np.random.Generator, count: int, dim: int) -> Array:
+    """Random tests (count, 3) as in `standard_slip_tests`, at stresses from 0.05 S/2 on."""
+    fraction = rng.uniform(0.05, 1.0, count)
+    azimuth = rng.uniform(0.0, 360.0, count)
+    return np.column_stack([fraction, azimuth * (dim == 3), rng.uniform(0.3, 1.0, count)])
 
 
-def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Slip:
-    """Shear there and back along `ways` (paths, 3), of which the stress S/2 is in Pa."""
-    share, azimuth, length = ways.T
-    dim, R, D = law.tables.dim, closure_range, law.mating_length
-    unit, far = D if math.isfinite(D) else 10 * R, distance(D, R)
-    places = np.geomspace(_FIRST * min(R, far), far, LEG)[:, None] * length
-    leg = np.diff(places, axis=0, prepend=0.0)
-    turn = np.radians(azimuth)
-    along = np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, : dim - 1]
-    goal = stress * share
-    batch = law.joints(len(goal), ledger=False, normal_stress=goal)
-    F = np.empty((2 * LEG, len(goal), dim))
-    rise, rate = np.empty(F.shape[:2]), np.zeros(len(goal))
-    for k, steps in enumerate(np.concatenate([leg, -leg])):
-        step = np.column_stack([rate * steps, steps[:, None] * along])
-        step[:, 0] = closing_increments(batch, step, NormalCondition(goal, goal), HELD)
+def run_slip_tests(law: JointLaw, closure_range: float, stress: float, tests: Array) -> SlipResults:
+    """Shear new joints forwards and back at constant normal stress.
+
+    closure_range: of the standard paths, in m. stress: the normal stress S/2 in Pa.
+    tests: (n, 3) as in `standard_slip_tests`.
+    """
+    stress_fraction, azimuth, length_fraction = tests.T
+    dim = law.tables.dim
+    mating_length = law.mating_length
+    farthest = max_slip(mating_length, closure_range)
+    unit = mating_length if math.isfinite(mating_length) else 10 * closure_range
+    first = _FIRST_STEP * min(closure_range, farthest)
+    slip = np.geomspace(first, farthest, STEPS_PER_LEG)[:, None] * length_fraction
+    increments = np.diff(slip, axis=0, prepend=0.0)
+    psi = np.radians(azimuth)
+    direction = np.stack([np.cos(psi), np.sin(psi)], axis=-1)[:, : dim - 1]
+    normal = stress * stress_fraction
+    batch = law.joints(len(normal), ledger=False, normal_stress=normal)
+    F = np.empty((2 * STEPS_PER_LEG, len(normal), dim))
+    tan_dilation = np.empty(F.shape[:2])
+    closing_rate = np.zeros(len(normal))  # first guess of closure over slip
+    for k, shear in enumerate(np.concatenate([increments, -increments])):
+        step = np.column_stack([closing_rate * shear, shear[:, None] * direction])
+        step[:, 0] = closing_increments(
+            batch, step, NormalCondition(normal, normal), STRESS_TOLERANCE
+        )
         F[k], _ = batch.update(step, tangent=False)
-        rate = step[:, 0] / steps
-        rise[k] = -step[:, 0] / np.abs(steps)
-    shear = np.repeat([1.0, -1.0], LEG)[:, None] * np.sum(F[:, :, 1:] * along, axis=2)
-    turned = places >= np.maximum(MOBILISED * far * length, 2 * R)
-    counts = np.concatenate([places >= MOBILISED * unit, turned])
-    return Slip(F, np.degrees(np.arctan2(shear, F[:, :, 0])), np.degrees(np.arctan(rise)), counts)
+        closing_rate = step[:, 0] / shear
+        tan_dilation[k] = -step[:, 0] / np.abs(shear)
+    sense = np.repeat([1.0, -1.0], STEPS_PER_LEG)[:, None]
+    shear_stress = sense * np.sum(F[:, :, 1:] * direction, axis=2)
+    is_mobilised_back = slip >= np.maximum(
+        _MOBILISED_SLIP * farthest * length_fraction, 2 * closure_range
+    )
+    is_mobilised = np.concatenate([slip >= _MOBILISED_SLIP * unit, is_mobilised_back])
+    friction = np.degrees(np.arctan2(shear_stress, F[:, :, 0]))
+    return SlipResults(F, friction, np.degrees(np.arctan(tan_dilation)), is_mobilised)

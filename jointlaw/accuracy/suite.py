@@ -1,4 +1,4 @@
-"""The standard paths on which accuracy is measured, and errors along them.
+"""The standard paths on which accuracy is measured, and the errors of a resolution on them.
 
 With R the law's closure range and S the normal stress there, the paths are
 
@@ -8,24 +8,24 @@ With R the law's closure range and S the normal stress there, the paths are
     constant closure   R, shear along 20 degrees to R: the largest load of all
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
-    weave              closed five times while the shear crosses itself (in space)
+    weave              closed five times while the shear crosses itself (in 3-D)
     far                R/2, shear along 20 degrees to three mating lengths, 3 R at most, and back
-    slip               as far at the stresses S/2 and S/20, held by every resolution itself; errors
-                       count where friction is mobilised (`Slip.counts`)
+    slip               as far at the stresses S/2 and S/20, each controlled by every resolution;
+                       errors count where friction is mobilised (`SlipResults.is_mobilised`)
 
-Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
-at a stress of S/2 to S) and shears up to R, every second one rounded. One of eight slips as `far`
-does, at the closure of S/20 to S/2, and one of sixteen as `slip` does, along other ways. They are
-drawn once and for all, so that they too are the same for every resolution. A law without critical
-slip takes 30 R for three of them. At a given closure a longer slip would end at many times the
-stress S; at a given stress a law that jams, atan(mu) + 90 deg/a above 88 degrees, has no end, and
-leaves `slip` out.
+Excursions are random paths: four to ten legs between corners with closures from -0.3 R to R (one of
+them at a stress of S/2 to S) and shears up to R, every second path smooth. Every eighth slips as
+`far` does, at the closure of S/20 to S/2; one slip test at random stress and azimuth is added for
+every sixteen. The generator has a fixed seed, so that every resolution follows the same paths.
+A law without mating length slips by 30 R in the slip tests. At a constant closure a longer slip
+would end at many times the stress S; at a constant stress a law that jams, atan(mu) + 90 deg/a
+above 88 degrees, slips without end, and has no slip tests.
 
-Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
-a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
-projected on its plane; one of closure only the closures of those that shut more than once. Those at
-constant stress are found once, at half the reference resolution, and are paths of displacement from
-then on, so that every resolution is asked the same.
+Along 0, 45 and 90 degrees the azimuths of facets are symmetric; other azimuths lie between, where
+few azimuths have the largest errors. A law with a plane takes the paths along azimuth 0 and the
+others projected on its plane; a law of closure only takes the closures of paths that close more
+than once. Paths at constant stress are computed once, at half the reference resolution, and are
+paths of displacement from then on, so that every resolution follows the same displacements.
 """
 
 import math
@@ -41,221 +41,275 @@ from ..joints.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
-from .slip import HELD, JointLaw, Slip, distance, random_ways, slip, standard_ways
+from .slip import (
+    STRESS_TOLERANCE,
+    JointLaw,
+    SlipResults,
+    max_slip,
+    random_slip_tests,
+    run_slip_tests,
+    standard_slip_tests,
+)
 
 STEPS = 120  # of each path
-FAR = 3.0  # R: the longest slip at a given closure
-_JAMS = 88.0  # degrees: the steepest friction angle of a law that slips at a given stress
+MAX_SLIP_AT_CONSTANT_CLOSURE = 3.0  # R
+_JAMMING_ANGLE = 88.0  # degrees: a law with a larger friction angle has no slip tests
+_EXCURSION_SEED = 8
+_SLIP_SEED = 18
 
 
 def reference_resolution(law: JointLaw) -> Resolution:
-    """The resolution whose tractions count as exact: steep facets (small a) need the most of it."""
-    if law.heights is None and law.asperity.eta == 0.0:  # one spring, whose slip has a sharp onset
+    """The resolution of the reference solution: steep facets (small a) need the most nodes."""
+    if law.heights is None and law.asperity.eta == 0.0:  # one spring: sharp onset of sliding
         return Resolution(64, 48, 1)
     return Resolution(math.ceil(6 + 32 / law.orientation.a), 16, 36)
 
 
-def steepest(law: JointLaw) -> float:
-    """Limit of the friction angle under long slip at small stress: atan(mu) + 90 deg/a."""
+def limit_friction_angle(law: JointLaw) -> float:
+    """Friction angle under long slip at small stress, atan(mu) + 90 deg/a, in degrees."""
     return math.degrees(math.atan(law.asperity.mu)) + 90.0 / law.orientation.a
 
 
-def scaled(r: Resolution, share: float) -> Resolution:
-    """That many times the nodes in each direction."""
+def scale_resolution(r: Resolution, factor: float) -> Resolution:
+    """A resolution with `factor` times the nodes in each direction."""
     return replace(
         r,
-        u=max(round(share * r.u), 1),
-        phi=max(round(share * r.phi), 3),
-        depth=max(round(share * r.depth), 1),
+        u=max(round(factor * r.u), 1),
+        phi=max(round(factor * r.phi), 3),
+        depth=max(round(factor * r.depth), 1),
     )
 
 
-class Miss(NamedTuple):
-    """How far a resolution is off.
+class SuiteErrors(NamedTuple):
+    """Errors of a resolution on a suite.
 
-    `largest` (paths,): shares of the path's largest |F|. `friction`, `dilation`: largest misses of
-    the angles under slip, in degrees; NaN for a joint that does not shear, or jams.
+    traction: (paths,), over the largest |F| of each path.
+    friction, dilation: largest errors of the angles under slip, in degrees; NaN for a law without
+        slip tests.
     """
 
-    largest: Array
+    traction: Array
     friction: float
     dilation: float
 
 
 @dataclass(frozen=True)
 class Suite:
-    """Paths of one law: increments d (steps, paths, dim) in m and reference tractions F in Pa.
+    """Paths of one law, with the reference solution.
 
-    The paths of `slip`, which are no paths of displacement, come last in `names`.
+    names: (paths,). Slip tests come last; they are not paths of displacement.
+    d: increments (steps, paths, dim) in m.
+    F: reference tractions (steps, paths, dim) in Pa.
+    slip: reference results of the slip tests, None without them.
+    run_slip: runs the slip tests with another resolution of the law.
+    uncertainty: (paths,), of F: its difference from the solution with two thirds of the nodes.
     """
 
     names: tuple[str, ...]
     d: Array
     F: Array
-    slip: Slip | None
-    slide: Callable[[JointLaw], Slip]  # along the same ways at the same stress
-    uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
+    slip: SlipResults | None
+    run_slip: Callable[[JointLaw], SlipResults]
+    uncertainty: Array
 
-    def miss(self, law: JointLaw) -> Miss:
-        """How far another resolution is off, or closure range."""
-        largest = errors(tractions(law, self.d), self.F)
+    def errors(self, law: JointLaw) -> SuiteErrors:
+        """Errors of the law with another resolution or closure range."""
+        traction = relative_errors(tractions(law, self.d), self.F)
         if self.slip is None:
-            return Miss(largest, math.nan, math.nan)
-        mine = self.slide(law)
-        more = errors(mine.F, self.slip.F, self.slip.counts)
-        return Miss(np.append(largest, more), *mine.apart(self.slip))
+            return SuiteErrors(traction, math.nan, math.nan)
+        results = self.run_slip(law)
+        slip_traction = relative_errors(results.F, self.slip.F, self.slip.is_mobilised)
+        angles = results.largest_differences(self.slip)
+        return SuiteErrors(np.append(traction, slip_traction), *angles)
 
 
 @lru_cache(maxsize=16)
 def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
-    """The standard paths of a law, with tractions at `best`, by default the reference resolution.
+    """The standard paths of a law with their reference solution.
 
-    `excursions` random paths come after them. Second-order convergence makes the reference's own
-    error about 0.8 of its `uncertainty`.
+    best: resolution of the reference solution; None takes `reference_resolution`.
+    excursions: number of random paths, which follow the standard ones.
+
+    Convergence is of second order, so the error of the reference is about 0.8 of its `uncertainty`.
     """
     best = best or reference_resolution(law)
     law = replace(law, resolution=best)
     stress = float(law.normal_stress(law.closure_range)) / 2
-    called, goal, held = _paths(law, stress)
+    names, points, at_constant_stress = _standard_paths(law, stress)
     if excursions:
-        goal = np.concatenate([goal, _excursions(law, stress, excursions)], axis=1)
-        held = np.append(held, np.zeros(excursions, bool))
-        called += tuple(f"excursion {i + 1}" for i in range(excursions))
-    d = np.diff(goal, axis=0, prepend=0.0)
-    d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
-    slid, ways = None, standard_ways(law.tables.dim)
-    if not law.closure_only and steepest(law) < _JAMS:
-        more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)
-        called += tuple(f"slip {way:g} at S/{2 / share:g}" for share, way, _ in ways)
-        called += tuple(f"slip {i + 1}" for i in range(len(more)))
-        ways = np.concatenate([ways, more])
-        slid = slip(law, law.closure_range, stress, ways)
-    slide = partial(slip, closure_range=law.closure_range, stress=stress, ways=ways)
-    suite = Suite(called, d, tractions(law, d), slid, slide, np.full(len(called), np.nan))
-    coarser = replace(law, resolution=scaled(best, 2 / 3))
-    return replace(suite, uncertainty=suite.miss(coarser).largest)
+        points = np.concatenate([points, _random_excursions(law, stress, excursions)], axis=1)
+        at_constant_stress = np.append(at_constant_stress, np.zeros(excursions, bool))
+        names += tuple(f"excursion {i + 1}" for i in range(excursions))
+    d = np.diff(points, axis=0, prepend=0.0)
+    coarse = replace(law, resolution=scale_resolution(best, 1 / 2))
+    d = _control_stress(coarse, d, at_constant_stress, stress)
+    slip_results = None
+    slip_tests = standard_slip_tests(law.tables.dim)
+    if not law.closure_only and limit_friction_angle(law) < _JAMMING_ANGLE:
+        rng = np.random.default_rng(_SLIP_SEED)
+        random_tests = random_slip_tests(rng, excursions // 16, law.tables.dim)
+        names += tuple(
+            f"slip {azimuth:g} at S/{2 / fraction:g}" for fraction, azimuth, _ in slip_tests
+        )
+        names += tuple(f"slip {i + 1}" for i in range(len(random_tests)))
+        slip_tests = np.concatenate([slip_tests, random_tests])
+        slip_results = run_slip_tests(law, law.closure_range, stress, slip_tests)
+    run_slip = partial(
+        run_slip_tests, closure_range=law.closure_range, stress=stress, tests=slip_tests
+    )
+    unknown = np.full(len(names), np.nan)
+    suite = Suite(names, d, tractions(law, d), slip_results, run_slip, unknown)
+    coarser = replace(law, resolution=scale_resolution(best, 2 / 3))
+    return replace(suite, uncertainty=suite.errors(coarser).traction)
 
 
 def tractions(law: JointLaw, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
-    batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
+    batch = law.joints(d.shape[1], ledger=False)
+    F = np.empty_like(d)
     for k, step in enumerate(track(d, "steps of the paths", len(d))):
         F[k], _ = batch.update(step, tangent=False)
     return F
 
 
-def errors(F: Array, reference: Array, counts: Any = True) -> Array:
+def relative_errors(F: Array, reference: Array, where: Any = True) -> Array:
     """Largest |F - reference| (steps, paths, dim) over each path's largest |reference|: (paths,).
 
-    counts: (steps, paths), which steps count; all by default. 0 for a path that nothing resists:
-    few asperities may reach so high.
+    where: (steps, paths), the steps that count. The error is 0 for a path without resistance, on
+    which few asperities are high enough to touch.
     """
-    off, most = (
-        np.linalg.norm(f, axis=2).max(axis=0, where=counts, initial=0.0)
+    largest_error, largest = (
+        np.linalg.norm(f, axis=2).max(axis=0, where=where, initial=0.0)
         for f in (F - reference, reference)
     )
-    return np.divide(off, most, out=np.zeros_like(off), where=most > 0.0)
+    return np.divide(largest_error, largest, out=np.zeros_like(largest_error), where=largest > 0.0)
 
 
-def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
-    """Names, places (steps, paths, dim) in m, and which paths hold the normal stress from STEPS/10.
+def _standard_paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
+    """Names, points (steps, paths, dim) in m, and which paths are at constant normal stress.
 
-    The closures of those that hold it are first guesses.
+    Constant stress begins at step STEPS/10; the closures of these paths are first guesses.
     """
-    R, seat = law.closure_range, float(law.closure(stress)) / law.closure_range
+    R = law.closure_range
+    seat = float(law.closure(stress)) / R
     s = np.arange(1, STEPS + 1) / STEPS
     shear = _legs(s, [0, 0.1, 1], [0, seat, seat], [0, 0, 1])
-    back = _legs(s, [0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
-    fixed = _legs(s, [0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    way = min(distance(law.mating_length, R) / R, FAR)
-    far = _legs(s, [0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, way, 0])
-    again = _legs(s, [0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
-                 [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
-    turn = 2 * np.pi * s
-    walk = np.stack([
-        0.45 * (1 - np.cos(3 * turn)) * (0.7 + 0.3 * np.sin(turn)) + 0.1 * np.sin(turn / 4),
-        0.5 * np.sin(2 * turn) + 0.3 * np.sin(3.3 * turn + 0.4) - 0.3 * np.sin(0.4),
-        0.45 * np.sin(1.7 * turn) + 0.25 * np.sin(4.1 * turn + 1.0) - 0.25 * np.sin(1.0),
-    ], axis=-1)  # fmt: skip
-    weave = np.stack([
-        0.525 - 0.525 * np.cos(5 * turn) + 0.4 * s * (1 - s),
-        0.7 * np.sin(1.3 * turn),
-        0.7 * (np.sin(2.1 * turn + 0.7) - np.sin(0.7)) / (1 + np.sin(0.7)),
-    ], axis=-1)  # fmt: skip
-    named = {
-        "closure": _along(_legs(s, [0, 0.4, 0.8, 1], [0, 1, 0, 0.5], [0, 0, 0, 0]), 0),
-        "shear 0": _along(shear, 0),
-        "shear 45": _along(shear, 45),
-        "shear 90": _along(shear, 90),
-        "reversal": _along(back, 30),
-        "constant closure": _along(fixed, 20),
-        "re-contact": _along(again, 65),
-        "walk": walk,
-        "far": _along(far, 20),
-        "weave": weave,
+    reversal = _legs(s, [0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
+    constant_closure = _legs(s, [0, 0.2, 1], [0, 1, 1], [0, 0, 1])
+    distance = min(max_slip(law.mating_length, R) / R, MAX_SLIP_AT_CONSTANT_CLOSURE)
+    far = _legs(s, [0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, distance, 0])
+    recontact = _legs(
+        s, [0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8], [0, 0, 0.4, 0.7, 0.2, 0.5]
+    )
+    paths = {
+        "closure": _in_space(_legs(s, [0, 0.4, 0.8, 1], [0, 1, 0, 0.5], [0, 0, 0, 0]), 0),
+        "shear 0": _in_space(shear, 0),
+        "shear 45": _in_space(shear, 45),
+        "shear 90": _in_space(shear, 90),
+        "reversal": _in_space(reversal, 30),
+        "constant closure": _in_space(constant_closure, 20),
+        "re-contact": _in_space(recontact, 65),
+        "walk": _walk(s),
+        "far": _in_space(far, 20),
+        "weave": _weave(s),
     }
     if law.closure_only:
-        named = {name: named[name][:, :1] for name in ("closure", "re-contact", "walk", "weave")}
+        names = ("closure", "re-contact", "walk", "weave")
+        paths = {name: paths[name][:, :1] for name in names}
     elif law.plane is not None:
-        turned = ("shear 45", "shear 90", "weave")
-        named |= {"reversal": back, "constant closure": fixed, "re-contact": again, "far": far}
-        named = {name: path[:, :2] for name, path in named.items() if name not in turned}
-    held = np.array([name.startswith(("shear", "reversal")) for name in named])
-    return tuple(named), R * np.stack(list(named.values()), axis=1), held
+        off_plane = ("shear 45", "shear 90", "weave")
+        paths |= {
+            "reversal": reversal,
+            "constant closure": constant_closure,
+            "re-contact": recontact,
+            "far": far,
+        }
+        paths = {name: path[:, :2] for name, path in paths.items() if name not in off_plane}
+    at_constant_stress = np.array([name.startswith(("shear", "reversal")) for name in paths])
+    return tuple(paths), R * np.stack(list(paths.values()), axis=1), at_constant_stress
 
 
-def _excursions(law: JointLaw, stress: float, count: int) -> Array:
-    """Random places (steps, count, dim) in m."""
-    rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
-    goal = []
+def _walk(s: Array) -> Array:
+    """A smooth random walk (steps, 3) in closure ranges."""
+    turn = 2 * np.pi * s
+    closure = 0.45 * (1 - np.cos(3 * turn)) * (0.7 + 0.3 * np.sin(turn)) + 0.1 * np.sin(turn / 4)
+    shear_2 = 0.5 * np.sin(2 * turn) + 0.3 * np.sin(3.3 * turn + 0.4) - 0.3 * np.sin(0.4)
+    shear_3 = 0.45 * np.sin(1.7 * turn) + 0.25 * np.sin(4.1 * turn + 1.0) - 0.25 * np.sin(1.0)
+    return np.stack([closure, shear_2, shear_3], axis=-1)
+
+
+def _weave(s: Array) -> Array:
+    """Five closures while the shear crosses itself (steps, 3), in closure ranges."""
+    turn = 2 * np.pi * s
+    closure = 0.525 - 0.525 * np.cos(5 * turn) + 0.4 * s * (1 - s)
+    shear_2 = 0.7 * np.sin(1.3 * turn)
+    shear_3 = 0.7 * (np.sin(2.1 * turn + 0.7) - np.sin(0.7)) / (1 + np.sin(0.7))
+    return np.stack([closure, shear_2, shear_3], axis=-1)
+
+
+def _random_excursions(law: JointLaw, stress: float, count: int) -> Array:
+    """Points (steps, count, dim) in m of random paths."""
+    rng = np.random.default_rng(_EXCURSION_SEED)
+    R = law.closure_range
+    s = np.arange(1, STEPS + 1) / STEPS
+    paths = []
     for i in range(count):
         if i % 8 == 7:
-            goal.append(far_path(law, rng, stress, s))
+            paths.append(random_slip_path(law, rng, stress, s))
             continue
         legs = int(rng.integers(4, 11))
         closure = np.append(0.0, rng.uniform(-0.3, 1.0, legs))
         highest = float(law.closure(stress * rng.uniform(1.0, 2.0))) / R
         closure[rng.integers(1, legs + 1)] = highest
         shear = np.append(0.0, np.sqrt(rng.random(legs)))
-        turn = rng.uniform(0.0, 2.0 * np.pi, legs + 1)
-        corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=-1)
-        at = np.linspace(0.0, 1.0, legs + 1)
-        goal.append(PchipInterpolator(at, corners)(s) if i % 2 else _legs(s, at, *corners.T))
-    return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
+        azimuth = rng.uniform(0.0, 2.0 * np.pi, legs + 1)
+        corners = np.stack([closure, shear * np.cos(azimuth), shear * np.sin(azimuth)], axis=-1)
+        times = np.linspace(0.0, 1.0, legs + 1)
+        is_smooth = i % 2
+        paths.append(
+            PchipInterpolator(times, corners)(s) if is_smooth else _legs(s, times, *corners.T)
+        )
+    return R * np.stack(paths, axis=1)[:, :, : law.tables.dim]
 
 
-def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -> Array:
-    """Random places (steps, 3) in closure ranges: slip at one closure, back, and forth again.
+def random_slip_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -> Array:
+    """A random path (steps, 3) in closure ranges: slip at constant closure, reversed twice.
 
-    The closure is that at a normal stress between a tenth of `stress` and all of it.
+    The closure belongs to a normal stress between a tenth of `stress` (Pa) and `stress`.
+    s: (steps,), the fraction of the path at each step.
     """
     R = law.closure_range
     closure = float(law.closure(stress * rng.uniform(0.1, 1.0))) / R
-    way = min(distance(law.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
-    back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
-    path = _legs(s, [0.0, 0.1, 0.4, 0.8, 1.0], [0.0, *4 * [closure]], [0.0, 0.0, way, back, way])
-    return _along(path, np.degrees(turn))
+    limit = min(max_slip(law.mating_length, R) / R, MAX_SLIP_AT_CONSTANT_CLOSURE)
+    farthest = limit * rng.uniform(0.3, 1.0)
+    reversed_to = farthest * rng.uniform(-1.0, 0.5)
+    azimuth = rng.uniform(0.0, 2.0 * np.pi)
+    slip = [0.0, 0.0, farthest, reversed_to, farthest]
+    path = _legs(s, [0.0, 0.1, 0.4, 0.8, 1.0], [0.0, *4 * [closure]], slip)
+    return _in_space(path, np.degrees(azimuth))
 
 
-def _legs(s: Array, at: Any, *columns: Any) -> Array:
-    """Places (steps, columns) on straight legs between corners, which are reached at `at`."""
-    return np.stack([np.interp(s, at, column) for column in columns], axis=-1)
+def _legs(s: Array, times: Any, *columns: Any) -> Array:
+    """Points (steps, columns) on straight legs between corners, which are reached at `times`."""
+    return np.stack([np.interp(s, times, column) for column in columns], axis=-1)
 
 
-def _along(path: Array, degrees: float) -> Array:
-    """Closure and shear (steps, 2) as places in space, the shear along this azimuth."""
-    turn = np.radians(degrees)
-    return np.stack([path[:, 0], np.cos(turn) * path[:, 1], np.sin(turn) * path[:, 1]], axis=-1)
+def _in_space(path: Array, azimuth: float) -> Array:
+    """Closure and shear (steps, 2) as points (steps, 3), the shear along an azimuth in degrees."""
+    psi = np.radians(azimuth)
+    return np.stack([path[:, 0], np.cos(psi) * path[:, 1], np.sin(psi) * path[:, 1]], axis=-1)
 
 
-def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:
-    """Increments whose closures keep the normal stress on the paths `held`."""
-    d, which, condition = d.copy(), np.flatnonzero(held), NormalCondition(stress, stress)
-    batch = law.joints(len(which), ledger=False)
+def _control_stress(law: JointLaw, d: Array, at_constant_stress: Array, stress: float) -> Array:
+    """Increments d whose closures keep the normal stress (Pa) constant on the paths selected."""
+    d = d.copy()
+    selected = np.flatnonzero(at_constant_stress)
+    condition = NormalCondition(stress, stress)
+    batch = law.joints(len(selected), ledger=False)
     for k in range(len(d)):
-        step = d[k, which]
+        step = d[k, selected]
         if k >= STEPS // 10:
-            step[:, 0] = closing_increments(batch, step, condition, HELD)
+            step[:, 0] = closing_increments(batch, step, condition, STRESS_TOLERANCE)
         batch.update(step, tangent=False)
-        d[k, which] = step
+        d[k, selected] = step
     return d

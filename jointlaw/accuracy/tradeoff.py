@@ -1,4 +1,4 @@
-"""The price list of a law: what each resolution costs and how far its tractions are off."""
+"""Cost and error of the resolutions of a law."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,62 +14,68 @@ from ..support.progress import track
 from .slip import JointLaw
 from .suite import Suite, standard_suite
 
-SPREAD = tuple(
+DEFAULT_RESOLUTIONS = tuple(
     Resolution(u, phi, depth)
     for u, phi in ((1, 3), (2, 3), (3, 3), (3, 5), (5, 6), (8, 8))
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
-ROUNDING = 1e-6  # a smaller share by which errors differ is none
-_MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
+EQUAL_ERRORS = 1e-6  # relative difference below which two errors count as equal
+MAX_TIMING_MEMORY = 100_000_000  # bytes of state of a timed batch; very fine laws get fewer joints
 
 
 @dataclass(frozen=True)
-class Price:
-    """One resolution: `error` (paths,) is that of the traction, over the largest of each path.
+class ResolutionCost:
+    """Cost and error of one resolution.
 
-    `friction`, `dilation`: largest misses of the angles (degrees) at constant normal stress, from
-    0.2 mating lengths on. `ns`, `ns_tangent`: nanoseconds per joint and update without and with
-    tangent, no ledger, least of several runs; NaN where nothing was timed. `bytes`: per joint.
+    resolution: its nodes. sliders: their number.
+    traction_error: (paths,), over the largest traction of each path.
+    friction_error, dilation_error: largest errors of the angles (degrees) at constant normal
+        stress, from 0.2 mating lengths on.
+    update_ns, tangent_update_ns: nanoseconds per joint and update without and with tangent, without
+        tracking dissipation, minimum of several runs; NaN without timing.
+    bytes_per_joint: size of the state.
     """
 
     resolution: Resolution
     sliders: int
-    error: Array
-    friction: float
-    dilation: float
-    ns: float
-    ns_tangent: float
-    bytes: int
+    traction_error: Array
+    friction_error: float
+    dilation_error: float
+    update_ns: float
+    tangent_update_ns: float
+    bytes_per_joint: int
 
     @property
-    def worst(self) -> float:
+    def max_error(self) -> float:
         """Largest error of the traction on the standard paths."""
-        return float(self.error.max())
+        return float(self.traction_error.max())
 
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """Prices by ascending sliders; print it to read its frontier and the named ones.
+    """Costs of resolutions by ascending sliders; `print` shows the Pareto front and the named ones.
 
-    `uncertainty` (paths,) is that of the reference that errors are measured against; `joints` the
-    size of the batch that was timed, on the kernel and threads named in `how`; `named` are the
-    resolutions of this law that have names.
+    paths: names of the standard paths.
+    uncertainty: (paths,), of the reference solution.
+    rows: one for each resolution.
+    joints: size of the timed batch, 0 without timing. kernel: compiled or numpy, and its threads.
+    named: the resolutions of this law that have names.
     """
 
     paths: tuple[str, ...]
     uncertainty: Array
-    rows: tuple[Price, ...]
+    rows: tuple[ResolutionCost, ...]
     joints: int
-    how: str
+    kernel: str
     named: dict[str, Resolution]
 
-    def frontier(self) -> tuple[Price, ...]:
-        """The prices that no other with as few sliders beats or equals in its largest error."""
-        best: list[Price] = []
-        for row in sorted(self.rows, key=lambda row: (row.sliders, row.worst)):
-            if not best or row.worst < (1.0 - ROUNDING) * best[-1].worst:
-                best.append(row)
-        return tuple(best)
+    def pareto_front(self) -> tuple[ResolutionCost, ...]:
+        """The resolutions with smaller largest errors than all with as few sliders."""
+        front: list[ResolutionCost] = []
+        for row in sorted(self.rows, key=lambda row: (row.sliders, row.max_error)):
+            if not front or row.max_error < (1.0 - EQUAL_ERRORS) * front[-1].max_error:
+                front.append(row)
+        return tuple(front)
 
     def __str__(self) -> str:
         lines = [
@@ -78,24 +84,25 @@ class Tradeoff:
             f"{'worst path':16s}name"
         ]
         names = {r: name for name, r in self.named.items()}
-        shown = {row.resolution for row in self.frontier()} | set(names)
+        selected = {row.resolution for row in self.pareto_front()} | set(names)
         for row in sorted(self.rows, key=lambda row: row.sliders):
             r = row.resolution
-            if r not in shown:
+            if r not in selected:
                 continue
-            path = self.paths[int(row.error.argmax())]
+            path = self.paths[int(row.traction_error.argmax())]
             lines.append(
-                f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
-                f"{row.worst:10.3%} {row.friction:8.2f}° {row.dilation:8.2f}° {row.ns:8.0f} "
-                f"{row.ns_tangent:13.0f}  {path:16s}{names.get(r, '')}".rstrip()
+                f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes_per_joint:7d} "
+                f"{row.max_error:10.3%} {row.friction_error:8.2f}° {row.dilation_error:8.2f}° "
+                f"{row.update_ns:8.0f} {row.tangent_update_ns:13.0f}  "
+                f"{path:16s}{names.get(r, '')}".rstrip()
             )
-        timed = f"ns per joint and update: up to {self.joints} joints, {self.how}"
+        timing = f"ns per joint and update: up to {self.joints} joints, {self.kernel}"
         return "\n".join([
             *lines,
-            f"{len(self.rows)} resolutions tried; listed are the named ones and the Pareto front "
-            "of sliders and max error.",
-            f"Uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
-            f"{timed if self.joints else 'nothing was timed'}",
+            f"{len(self.rows)} resolutions; listed are the named ones and the Pareto front of "
+            "sliders and max error.",
+            f"Uncertainty of the reference solution {self.uncertainty.max():.2%}; "
+            f"{timing if self.joints else 'not timed'}",
         ])  # fmt: skip
 
 
@@ -110,36 +117,46 @@ def tradeoff(
     lengths = law.mating_length, law.asperity.yield_interference, law.closure_range
     names = named(*lengths)
     if resolutions is None:
-        resolutions = (*SPREAD, *names.values())
-    chosen = {resolve(r, *lengths) for r in resolutions}
-    found = sorted(chosen, key=lambda r: (r.sliders, r.u, r.phi, r.lowest))
+        resolutions = (*DEFAULT_RESOLUTIONS, *names.values())
+    unique = {resolve(r, *lengths) for r in resolutions}
+    ordered = sorted(unique, key=lambda r: (r.sliders, r.u, r.phi, r.lowest))
     suite = standard_suite(law)
     rows = tuple(
-        _price(replace(law, resolution=r), suite, joints, seconds)
-        for r in track(found, "resolutions", len(found))
+        _measure_cost(replace(law, resolution=r), suite, joints, seconds)
+        for r in track(ordered, "resolutions", len(ordered))
     )
     threads = thread_count()
-    how = f"{law.joints(0).kernel}, up to {threads} thread{'s' * (threads > 1)}"
-    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, names)
+    kernel = f"{law.joints(0).kernel}, up to {threads} thread{'s' * (threads > 1)}"
+    return Tradeoff(suite.names, suite.uncertainty, rows, joints, kernel, names)
 
 
-def _price(law: JointLaw, suite: Suite, joints: int, seconds: float) -> Price:
-    size = law.joints(0).bytes_per_joint
-    ns, with_tangent = (_time(law, joints, tangent, seconds) for tangent in (False, True))
-    return Price(law.resolution, law.tables.sliders, *suite.miss(law), ns, with_tangent, size)
+def _measure_cost(law: JointLaw, suite: Suite, joints: int, seconds: float) -> ResolutionCost:
+    """Cost and error of the resolution of a law."""
+    errors = suite.errors(law)
+    return ResolutionCost(
+        law.resolution,
+        law.tables.sliders,
+        errors.traction,
+        errors.friction,
+        errors.dilation,
+        _time_update(law, joints, False, seconds),
+        _time_update(law, joints, True, seconds),
+        law.joints(0).bytes_per_joint,
+    )
 
 
-def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
-    """Least time of an update in ns per joint, of runs that take this long together."""
+def _time_update(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
+    """Minimum time of an update in ns per joint, over runs that take `seconds` in total."""
     if n == 0:
         return float("nan")
-    n = min(n, max(_MEMORY // (8 * law.tables.rows), 1))
-    batch, dim = law.joints(n, ledger=False), law.tables.dim
+    n = min(n, max(MAX_TIMING_MEMORY // (8 * law.tables.rows), 1))
+    batch = law.joints(n, ledger=False)
+    dim = law.tables.dim
     rng = np.random.default_rng(0)
     steps = rng.normal(0.0, 0.1 * law.closure_range, (3, n, dim))
-    moves = cycle([*steps, *-steps])
+    increments = cycle([*steps, *-steps])
     first = np.zeros((n, dim))
     first[:, 0] = law.closure_range * rng.uniform(0.3, 0.8, n)
     batch.update(first, tangent=tangent)
-    timer = Timer(lambda: batch.update(next(moves), tangent=tangent))
+    timer = Timer(lambda: batch.update(next(increments), tangent=tangent))
     return min(timer.repeat(max(3, round(seconds / timer.timeit(1))), 1)) / n * 1e9

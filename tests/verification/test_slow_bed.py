@@ -11,8 +11,8 @@ from scipy.integrate import trapezoid
 from slow_bed import SlowBed
 
 import jointlaw as jl
-from jointlaw.accuracy.suite import errors, reference_resolution, standard_suite, tractions
-from jointlaw.accuracy.tolerance import coarsest
+from jointlaw.accuracy.suite import reference_resolution, relative_errors, standard_suite, tractions
+from jointlaw.accuracy.tolerance import find_coarsest_resolution
 
 pytestmark = pytest.mark.slow
 
@@ -83,7 +83,7 @@ def test_reference_of_the_suite_agrees_with_the_slow_bed():
     paths = np.moveaxis(np.cumsum(suite.d, axis=0), 1, 0)
     F = np.stack([SlowBed(law, path, 6, 16, 120).follow()[0] for path in paths], axis=1)
     # the bed's own orientations (0.12 % here) and springs, and the reference's uncertainty
-    assert errors(F, suite.F).max() < 2.5e-3
+    assert relative_errors(F, suite.F).max() < 2.5e-3
     assert suite.uncertainty[: len(paths)].max() < 5e-4
     # and the paths do what they say: the normal stress is kept while sheared
     held = [i for i, name in enumerate(suite.names) if name.startswith(("shear", "reversal"))]
@@ -100,7 +100,7 @@ def test_depth_cells_converge_beyond_the_closure_range():
         tractions(replace(law, resolution=jl.Resolution(8, 7, depth)), far)
         for depth in (16, 32, 128)
     ]
-    coarse, fine = (errors(F, found[-1])[0] for F in found[:2])
+    coarse, fine = (relative_errors(F, found[-1])[0] for F in found[:2])
     assert fine < 6e-4
     assert coarse > 2.8 * fine  # second order: 4; it is 2 where the cells end with the range
 
@@ -115,17 +115,17 @@ def test_reference_is_refined_in_the_direction_that_errs():
     )
     usual, bound = reference_resolution(law), 6e-4
     assert standard_suite(law).uncertainty.max() > bound  # too coarse a judge
-    found, reached = coarsest(law, bound)
+    found, reached = find_coarsest_resolution(law, bound)
     fine = standard_suite(law, replace(usual, phi=2 * usual.phi))
     assert found is not None
     assert reached <= bound
     # half of the bound may be the judge's own error
-    assert fine.miss(replace(law, resolution=found)).largest.max() < 1.5 * bound
+    assert fine.errors(replace(law, resolution=found)).traction.max() < 1.5 * bound
 
 
 def test_what_cannot_be_met_is_refused_with_what_was_reached():
     law = replace(jl.presets.load("linear-a6"), plane=0.0)
-    with pytest.raises(ValueError, match=r"tolerance = 1e-07 cannot be met .* was reached"):
+    with pytest.raises(ValueError, match=r"tolerance = 1e-07 cannot be met .* the smallest error"):
         law.at_tolerance(1e-7)
 
 
@@ -135,7 +135,7 @@ def ratios(made, law, count, tolerance):
     corners = law.closure_range * random_corners(np.random.default_rng(2), count)[:, :, :2]
     d = np.ascontiguousarray(np.moveaxis(increments(corners, 20), 1, 0))
     truth = tractions(replace(law, resolution=reference_resolution(law)), d)
-    return errors(tractions(made, d), truth) / tolerance
+    return relative_errors(tractions(made, d), truth) / tolerance
 
 
 @pytest.mark.parametrize("name", ["westerly-smooth", "biegel-rough", "nonlinear-a6"])
@@ -157,7 +157,7 @@ def test_closure_only_takes_closures_alone():
     made = law.at_tolerance(0.01)
     assert made.closure_only
     assert made == law.at_tolerance(0.01)
-    assert [p.error.shape for p in law.tradeoff(["fast"], joints=0).rows] == [(4,)]
+    assert [row.traction_error.shape for row in law.tradeoff(["fast"], joints=0).rows] == [(4,)]
 
 
 @pytest.mark.parametrize("name", ["westerly-smooth", "nonlinear-a6"])

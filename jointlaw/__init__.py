@@ -13,14 +13,18 @@ from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .joints.pool import JointPool
 from .joints.state import NonFiniteError, load_state
+from .kernels.element import Element, ElementResponse
+from .kernels.reference import LawTables
 from .laboratory.experiments import PathError, closure_test, direct_shear
 from .laboratory.record import TestRecord
 from .laws.coulomb_law import CoulombLaw
 from .laws.joint_law import JointLaw
+from .laws.law import Law
 from .paper import closed_form
 from .paper.secant import secant
 from .parameters.asperity import Asperity
 from .parameters.bond import Bond
+from .parameters.declared import declared, parameter
 from .parameters.heights import GammaHeights, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import Resolution
@@ -43,6 +47,8 @@ __all__ = [
     "Bond",
     "ClosureCurve",
     "CoulombLaw",
+    "Element",
+    "ElementResponse",
     "GammaHeights",
     "Heights",
     "Joint",
@@ -50,6 +56,8 @@ __all__ = [
     "JointLaw",
     "JointPool",
     "JointTable",
+    "Law",
+    "LawTables",
     "NonFiniteError",
     "Orientation",
     "PathError",
@@ -58,6 +66,7 @@ __all__ = [
     "TestRecord",
     "closed_form",
     "closure_test",
+    "declared",
     "direct_shear",
     "export_c",
     "export_fem",
@@ -68,6 +77,7 @@ __all__ = [
     "from_surface",
     "load_state",
     "load_table",
+    "parameter",
     "presets",
     "secant",
     "tabulate",

@@ -20,7 +20,7 @@ from jointlaw.kernels.engine import Step
 
 from ..compiled import LawJointArrays, StepArrays, address
 from ..native.layout import MEASURES
-from ..scene import Law, Scene, opens_to
+from ..scene import Scene
 
 MAX_STRESS = 2e9  # Pa: end of the tabulated curves, more than any corner of rock bears
 MIN_CLOSURE = 1e-9  # m: closure from which the stick predictor takes its derivative
@@ -28,7 +28,7 @@ STATE_PARTS = "states", "fingerprint"  # saved for the joints of each law
 
 
 @lru_cache(maxsize=64)
-def tabulate_unmated_loading(law: Law) -> dict[str, np.ndarray]:
+def tabulate_unmated_loading(law: jl.Law) -> dict[str, np.ndarray]:
     """Closure since first touch (m) and work (J/m2) of a joint whose faces have never met."""
     closure = tabulate_first_loading(law)["closure"]
     batch = law.joints(len(closure), mated=False)
@@ -37,7 +37,7 @@ def tabulate_unmated_loading(law: Law) -> dict[str, np.ndarray]:
 
 
 @lru_cache(maxsize=64)
-def tabulate_first_loading(law: Law) -> dict[str, np.ndarray]:
+def tabulate_first_loading(law: jl.Law) -> dict[str, np.ndarray]:
     """First-loading curve of a law from zero closure to `MAX_STRESS`, by columns.
 
     "closure" in m, normal "stress" in Pa, "work" in J/m2, and "stiffness" in Pa/m, an upper bound.
@@ -51,40 +51,9 @@ def tabulate_first_loading(law: Law) -> dict[str, np.ndarray]:
     return {
         "closure": closure,
         "stress": stress,
-        "stiffness": stiffness_bound(law, closure, 1.0),
+        "stiffness": law.first_loading_stiffness(closure),
         "work": cumulative_trapezoid(stress, closure, initial=0.0),
     }
-
-
-def stiffness_bound(law: Law, closure: np.ndarray, reduction: float) -> np.ndarray:
-    """Upper bound (k,) in Pa/m of the stiffness of joints closed to `closure` (k,) in m.
-
-    Their shear stress is divided by F = `reduction` and their sliding multiplied by it. A facet at
-    inclination theta then has the normal (cos, sin/F) and the tangent (-sin, cos/F), so its elastic
-    stiffness is the largest eigenvalue of a 2 x 2 matrix. Friction adds at most mu times the square
-    of the length of the normal.
-    """
-    F = reduction
-    if isinstance(law, jl.CoulombLaw):
-        # The coupling of shear to closure has no eigenvalue of its own: those of
-        # (kn, 0; mu kn, 0) are kn and 0.
-        return np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness / F**2))
-    bound = law.max_stiffness(closure)
-    if F == 1.0:
-        return bound
-    cemented = 0.0
-    if bond := law.bond:
-        bound = bound - max(bond.normal_stiffness, bond.shear_stiffness)
-        cemented = max(bond.normal_stiffness, bond.shear_stiffness / F**2)
-    lam, mu = law.asperity.lam, law.asperity.mu
-    theta = np.linspace(0.0, np.pi / (2 * law.orientation.a), 65)
-    normal = np.cos(theta) ** 2 + np.sin(theta) ** 2 / F**2  # squares of the lengths
-    tangent = np.sin(theta) ** 2 + np.cos(theta) ** 2 / F**2
-    mixed = (np.cos(theta) * np.sin(theta) * (1 / F**2 - 1)) ** 2  # square of their product
-    spread = np.sqrt((normal - tangent / lam) ** 2 + 4 * mixed / lam)
-    elastic = 0.5 * (normal + tangent / lam + spread)
-    largest = float((elastic + mu * normal).max())
-    return bound * largest / (max(1.0, 1 / lam) + mu) + cemented
 
 
 class LawJoints:
@@ -95,10 +64,10 @@ class LawJoints:
     (places, 6 + 2), measures and displacements. silent_step: the same without `shown`.
     """
 
-    def __init__(self, law: Law, reduction: float) -> None:
+    def __init__(self, law: jl.Law, reduction: float) -> None:
         self.law = law
         self.curve = {**tabulate_first_loading(law)}
-        self.curve["stiffness"] = stiffness_bound(law, self.curve["closure"], reduction)
+        self.curve["stiffness"] = law.first_loading_stiffness(self.curve["closure"], reduction)
         self.clear()
 
     def clear(self) -> None:
@@ -164,7 +133,7 @@ class LawJoints:
         """Addresses of the arrays for the compiled step."""
         stress = self.curve["stress"]
         arrays = self.step.d, self.step.F, self.step.shown, stress, self.curve["stiffness"]
-        bears_tension = bool(opens_to(self.law) > 0.0)
+        bears_tension = self.law.tensile_opening > 0.0
         return LawJointArrays(*map(address, arrays), len(stress), bears_tension)
 
 
@@ -189,11 +158,7 @@ class Joints:
         self.reduction = np.array([1.0, scene.reduction])
         self.law_names = [*scene.laws]
         self.by_law = [LawJoints(law, scene.reduction) for law in scene.laws.values()]
-        # what bears tension: the joint of a Coulomb law, the bond of others
-        bonds = [law if isinstance(law, jl.CoulombLaw) else law.bond for law in scene.laws.values()]
-        self.tensile_stiffness = np.array(
-            [bond.normal_stiffness if bond else 0.0 for bond in bonds]
-        )
+        self.tensile_stiffness = np.array([law.tensile_stiffness for law in scene.laws.values()])
         self.first_touch = np.zeros((0, 2))
         self.edge_pairs = np.zeros((0, 2), int)
         self._arrange(np.zeros(0, int), np.zeros(0, int))

@@ -7,7 +7,7 @@ import numpy as np
 import jointlaw as jl
 
 from ..dynamics.simulation import Simulation
-from ..scene import Law, Scene, rotation
+from ..scene import Scene, rotation
 
 POINT = "x_m", "y_m", "vx_m/s", "vy_m/s"
 SLIP_DISTANCE = 2e-3  # m, for laws without a finite mating length
@@ -112,13 +112,14 @@ def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
     return {key: float(share @ column) for key, column in zip(keys, columns, strict=True)}
 
 
-def slip_distance(law: Law) -> float:
+def slip_distance(law: jl.Law) -> float:
     """Sliding (m) that counts as slip: the law's mating length."""
-    fades = isinstance(law, jl.JointLaw) and np.isfinite(law.mating_length)
-    return law.mating_length if fades else SLIP_DISTANCE
+    asperities = law.tables.asperities
+    has_mating_length = asperities is not None and asperities.fades
+    return asperities.mating_length if has_mating_length else SLIP_DISTANCE
 
 
-def friction_angle(law: Law, stress: float) -> float:
+def friction_angle(law: jl.Law, stress: float) -> float:
     """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
     if isinstance(law, jl.CoulombLaw):
         return float(np.degrees(np.arctan(law.friction + law.cohesion / stress)))
@@ -143,7 +144,7 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     return {"predicted_angle": None, "normal_stress": None}
 
 
-def shear_curve(law: Law, stress: float, slid: np.ndarray) -> jl.TestRecord | None:
+def shear_curve(law: jl.Law, stress: float, slid: np.ndarray) -> jl.TestRecord | None:
     """Direct shear of the law alone along the turning points of `slid` (m), at a normal stress.
 
     None for plain Coulomb and where the law cannot be sheared like this: no normal stress, no

@@ -12,7 +12,7 @@ read       a scene from its file
 from .blocks import Block, median_size, rotation
 from .drives import Drives
 from .keys import Tables, overlay
-from .laws import INTACT_ROCK, TYPICAL_STRESS, Files, Law, build_law, opens_to, springs
+from .laws import INTACT_ROCK, TYPICAL_STRESS, Files, build_law
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene, SceneError, Stress
 
@@ -23,7 +23,6 @@ __all__ = [
     "Block",
     "Drives",
     "Files",
-    "Law",
     "Run",
     "Scene",
     "SceneError",
@@ -33,11 +32,9 @@ __all__ = [
     "build_law",
     "load",
     "median_size",
-    "opens_to",
     "overlay",
     "parse",
     "read_tables",
     "rotation",
     "shipped",
-    "springs",
 ]

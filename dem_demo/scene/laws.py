@@ -9,10 +9,10 @@ from jointlaw.parameters.rock import require_rock
 
 from .keys import TABLE, Tables, overlay
 
-Law = jl.JointLaw | jl.CoulombLaw
 INTACT_ROCK = "intact rock"  # name of the law of cuts that are no joints
 TYPICAL_STRESS = 1e5  # Pa: normal stress of a joint where it is unknown
 COHESION_PER_TENSION = 1e3  # of intact rock
+CONSTANTS = "normal_stiffness", "shear_stiffness", "friction"  # parameters of Coulomb's law
 
 
 class Files(dict[str, str]):
@@ -29,7 +29,7 @@ class Files(dict[str, str]):
         return self.setdefault(name, (self.folder / name).read_text(encoding="utf-8-sig"))
 
 
-def build_law(data: Tables, where: str, files: Files) -> Law:
+def build_law(data: Tables, where: str, files: Files) -> jl.Law:
     """Build a law from a `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb".
 
     With `from`, the name of a preset or a parameter file, the keys of the table are laid over the
@@ -47,36 +47,21 @@ def build_law(data: Tables, where: str, files: Files) -> Law:
             path = files.folder / name
             files[name] = jl.presets.load_any(str(path) if path.is_file() else name).to_toml()
         own = overlay(tomllib.loads(files[name]), own)
-    law: Law = jl.JointLaw.from_dict({"plane": 0.0, **own}, where)
-    if isinstance(law, jl.CoulombLaw):
-        require_rock({**vars(law), "plane": 0.0}, f"{where}.")
-    else:
-        require_rock({"stiffness at 1 MPa": springs(law, 1e6)[0]}, f"{where}: ")
-        require_rock({"mu": law.asperity.mu}, f"{where}.asperity.")
+    law: jl.Law = jl.JointLaw.from_dict({"plane": 0.0, **own}, where)
+    own = {name: value for name, value in vars(law).items() if name in CONSTANTS}
+    require_rock(own, f"{where}.")
+    require_rock({"stiffness at 1 MPa": law.secant_stiffness(1e6)[0]}, f"{where}: ")
+    if law.tables.asperities is not None:
+        require_rock({"mu": law.tables.asperities.mu}, f"{where}.asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{where}.")
     return law
 
 
-def springs(law: Law, stress: float) -> tuple[float, float]:
-    """Secant stiffnesses in closure and in shear (Pa/m) at a normal stress (Pa)."""
-    if isinstance(law, jl.CoulombLaw):
-        return law.normal_stiffness, law.shear_stiffness
-    stiffness = float(stress / law.closure(stress))
-    return stiffness, stiffness / law.asperity.lam
-
-
-def intact_rock_law(laws: Iterable[Law], opening: float) -> jl.CoulombLaw:
+def intact_rock_law(laws: Iterable[jl.Law], opening: float) -> jl.CoulombLaw:
     """Build the law of a cut that is no joint, as stiff as the stiffest of some laws.
 
     opening: distance (m) at which its tension breaks.
     """
-    normal, shear = max(springs(law, TYPICAL_STRESS) for law in laws)
+    normal, shear = max(law.secant_stiffness(TYPICAL_STRESS) for law in laws)
     tension = normal * opening
     return jl.CoulombLaw(normal, shear, 1.0, COHESION_PER_TENSION * tension, tension, plane=0.0)
-
-
-def opens_to(law: Law) -> float:
-    """How far (m) a joint opens before tension no longer holds it."""
-    if isinstance(law, jl.CoulombLaw):
-        return law.tension / law.normal_stiffness
-    return 0.0 if law.bond is None else 1.0 / law.bond.limits[1][0]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from shapely import Point, Polygon
 
+import jointlaw as jl
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
@@ -15,7 +16,7 @@ from .blocks import LENGTH_TOLERANCE, Block, box, find_shape_error, median_width
 from .cutting import INWARD_CUT, JointSet, cut
 from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of
-from .laws import INTACT_ROCK, Files, Law, build_law, intact_rock_law, opens_to
+from .laws import INTACT_ROCK, Files, build_law, intact_rock_law
 from .scene import SKIN_PER_MEDIAN_WIDTH, Rock, Run, Scene, Stress
 
 SCENES = Path(__file__).parent / "scenes"
@@ -156,10 +157,10 @@ def _run(table: Tables, blocks: Sequence[Block]) -> Run:
     return Run(**lengths | table)
 
 
-def _require_openings(laws: dict[str, Law], skin: float, where: str) -> None:
+def _require_openings(laws: dict[str, jl.Law], skin: float, where: str) -> None:
     """Require that the contact of a joint is kept until its tension breaks. Raises ValueError."""
     for name, law in laws.items():
-        opening = opens_to(law)
+        opening = law.tensile_opening
         if opening > skin:
             raise ValueError(
                 f"{where}: laws.{name} holds until the joint is {opening:.3g} m open, but "

@@ -5,10 +5,12 @@ from functools import cached_property
 
 import numpy as np
 
+import jointlaw as jl
+
 from .blocks import Block, median_width
 from .drives import Drive
 from .keys import Tables
-from .laws import Files, Law
+from .laws import Files
 
 SKIN_PER_MEDIAN_WIDTH = 0.02  # of the blocks that move
 MAX_SKIN_PER_WIDTH = 0.1  # of a block's own width
@@ -104,7 +106,7 @@ class Scene:
 
     title: str
     blocks: tuple[Block, ...]
-    laws: dict[str, Law]
+    laws: dict[str, jl.Law]
     run: Run
     default_law: str
     pairs: dict[frozenset, str] = field(default_factory=dict)

@@ -16,7 +16,7 @@ import jointlaw as jl
 from ..output.monitors import slip_distance
 from ..output.record import Record, outcomes
 from ..output.run import to_failure
-from ..scene import TYPICAL_STRESS, Scene, springs
+from ..scene import TYPICAL_STRESS, Scene
 from .strength import alone
 
 FAR = 20.0  # slip distances: where the strength of a law is its residual one
@@ -67,6 +67,6 @@ def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:
     work = float(trapezoid(friction[top:] - residual, slid[top:]))
     bond = {"cohesion": law.bond.cohesion, "tension": law.bond.tension} if law.bond else {}
     return jl.CoulombLaw(
-        *springs(law, stress), fall + residual, residual_friction=residual, residual_cohesion=0.0,
-        weakening=2 * work / fall if fall else 0.0, plane=0.0, **bond,
+        *law.secant_stiffness(stress), fall + residual, residual_friction=residual,
+        residual_cohesion=0.0, weakening=2 * work / fall if fall else 0.0, plane=0.0, **bond,
     )  # fmt: skip

@@ -22,7 +22,7 @@ from ..contact import ContactManager, Contacts
 from ..dynamics.blocks import Blocks, apply_loads
 from ..dynamics.timestep import opening_and_sliding_rates
 from ..output.monitors import slip_distance
-from ..scene import Law, Scene
+from ..scene import Scene
 
 SMALLEST_FACTOR, LARGEST_FACTOR = 1 / 64, 64.0
 TOLERANCE = 1e-3  # of the factor
@@ -96,28 +96,29 @@ def overburden_stress(scene: Scene) -> float:
     return max(weight, float(np.abs(scene.in_situ.tensor).max()) * deepest)
 
 
-def strength_of(law: Law, stress: float) -> Strength:
+def strength_of(law: jl.Law, stress: float) -> Strength:
     """Strength of a law, for stresses of the order of `stress` (Pa).
 
     Of a rough law: tangents of its peak strength in direct shear. It is a concave function of the
     normal stress, so that tangents lie above it and the bound stays a bound.
     """
-    if isinstance(law, jl.CoulombLaw):
+    if type(law) is jl.CoulombLaw:  # a subclass may have more elements
         return Strength(np.array([law.cohesion]), np.array([law.friction]), law.tension)
     low, high = (share * stress for share in STRESS_RANGE)
     stresses = np.geomspace(low, high, STRESSES)
     peaks = np.array([peak_strength(law, s) for s in stresses])
     beside = np.array([peak_strength(law, SLOPE_STEP * s) for s in stresses])
     friction = (beside - peaks) / ((SLOPE_STEP - 1.0) * stresses)
-    return Strength(peaks - friction * stresses, friction, law.bond.tension if law.bond else 0.0)
+    return Strength(peaks - friction * stresses, friction, law.tensile_strength)
 
 
-def peak_strength(law: jl.JointLaw, stress: float) -> float:
+def peak_strength(law: jl.Law, stress: float) -> float:
     """Largest shear stress (Pa) of direct shear at a normal stress (Pa)."""
     slip = slip_distance(law)
     to = [1.2 * slip]
-    if law.bond:  # a brittle bond peaks early
-        to = sorted([min(1.01 / law.bond.limits[1][1], slip), 1.2 * slip])
+    bond = getattr(law, "bond", None)
+    if bond is not None:  # a brittle bond peaks early
+        to = sorted([min(1.01 / bond.limits[1][1], slip), 1.2 * slip])
     record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
     return float(np.abs(record.shear_stress).max())
 

@@ -17,7 +17,6 @@ import numpy as np
 from shapely import Point, Polygon
 from tqdm import tqdm
 
-import jointlaw as jl
 from jointlaw.support.files import write_json
 
 from ..dynamics.equilibrium import equilibrium_displacements
@@ -25,7 +24,7 @@ from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
 from ..output.record import named, told
 from ..output.run import to_failure
-from ..scene import Law, Scene, Tables, build, median_size, read_tables, rotation
+from ..scene import Scene, Tables, build, median_size, read_tables, rotation
 
 FILE, VERSION = "trials.json", 2
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
@@ -179,32 +178,8 @@ def weakened(scene: Scene, factor: float) -> Scene:
     stiffer in shear by the factor squared. Shear stiffness decides where normal forces depend on
     it, such as under in-situ stress or in a roof (docs/blocks.md).
     """
-    laws = {name: stiffened(law, factor) for name, law in scene.laws.items()}
+    laws = {name: law.strength_reduced(factor) for name, law in scene.laws.items()}
     return replace(scene, laws=laws, reduction=scene.reduction * factor)
-
-
-def stiffened(law: Law, factor: float) -> Law:
-    """The law inside a reduction of the strength by a factor (> 0): tension is divided by it, shear
-    stiffness multiplied by its square, normal stiffness kept."""
-    if isinstance(law, jl.CoulombLaw):
-        return replace(
-            law,
-            tension=law.tension / factor,
-            shear_stiffness=law.shear_stiffness * factor**2,
-            weakening=law.weakening / factor,
-        )
-    bond = law.bond
-    if bond:
-        energy = bond.energy_I and bond.energy_I / factor**2  # stays above the elastic energy
-        bond = replace(
-            bond,
-            tension=bond.tension / factor,
-            energy_I=energy,
-            shear_stiffness=bond.shear_stiffness * factor**2,
-        )
-    asperity = law.asperity
-    asperity = replace(asperity, K=asperity.K * factor**2, lam=asperity.lam / factor**2)
-    return replace(law, bond=bond, asperity=asperity)
 
 
 def _march(

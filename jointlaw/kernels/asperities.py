@@ -24,7 +24,7 @@ from ..support.thresholds import (
     UNDERFLOW,
 )
 from .cells import Cells, cells, compliance, reciprocal
-from .element import Element, Measures, Share
+from .element import Element, ElementResponse, Measures
 from .mating import Planes, Turning, first_touch, offset, planes, turning
 from .stiffness import bend_of, joining, rises, stiffness_of
 from .wear import lowered, worn_share
@@ -77,6 +77,8 @@ class Sliders(NamedTuple):
 class Asperities(Element):
     """Asperities that stick, slip and part; with mating, yielding and wear where the law has it."""
 
+    native_name = "asperities"
+
     def __init__(self, k: FacetTables) -> None:
         self.k, M = k, len(k.c1)
         self.rows = {"q": 2 * M * k.cells}
@@ -112,7 +114,9 @@ class Asperities(Element):
             "engagement_stiffness_limit": most,
         }
 
-    def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:
+    def step(
+        self, delta: Array, d: Array, state: Array, new: Array, tangent: bool
+    ) -> ElementResponse:
         """As `Element.step`.
 
         1. Where slopes wear they have, by the work of shear so far ("Wear"). The joint moves by d.
@@ -168,7 +172,7 @@ class Asperities(Element):
         if k.yields:
             lost = lost + crushed
         if not tangent:
-            return Share(F, lost, None)
+            return ElementResponse(F, lost, None)
         E = middle.basis
         if k.fades:  # the middle moves by half of what d changes by
             turned = turning(k, delta[1:] + 0.5 * d[1:], slopes).basis
@@ -179,7 +183,7 @@ class Asperities(Element):
             C = C - softening(k, after, flat0, flat1, sliders.push, end)
         if k.fades:
             C[:, 1:] += bending(k, after, sliders, new_.q, end, turning(k, moved[1:], slopes))
-        return Share(F, lost, C)
+        return ElementResponse(F, lost, C)
 
     def traction(self, delta: Array, state: Array) -> Array:
         """As `Element.traction`: slopes that are to wear in the next step have not yet."""
@@ -226,6 +230,29 @@ class Asperities(Element):
         closed = (closure[..., None] + 0.0 * self.k.c1, closure[..., None] + rises(self.k, shear))
         level, risen = (stiffness_of(self.k, np.moveaxis(y, -1, 0)) for y in closed)
         return 0.5 * (level + risen)
+
+    def shear_stiffness(self, delta: Array, stress: float) -> float:
+        """As `Element.shear_stiffness`: the secant normal stiffness over lam."""
+        return stress / float(delta[0, 0]) / self.k.lam if len(delta) > 1 else 0.0
+
+    def first_loading_stiffness(self, closure: Array, reduction: float) -> Array:
+        """As `Element.first_loading_stiffness`.
+
+        In a strength reduction F a facet at inclination theta has the normal (cos, sin/F) and the
+        tangent (-sin, cos/F), so its elastic stiffness is the largest eigenvalue of a 2 x 2 matrix.
+        Friction adds at most mu times the square of the length of the normal.
+        """
+        bound = self.largest_stiffness(closure, np.zeros(()))
+        F, lam, mu, theta = reduction, self.k.lam, self.k.mu, self.k.theta
+        if F == 1.0:
+            return bound
+        normal = np.cos(theta) ** 2 + np.sin(theta) ** 2 / F**2  # squares of the lengths
+        tangent = np.sin(theta) ** 2 + np.cos(theta) ** 2 / F**2
+        mixed = (np.cos(theta) * np.sin(theta) * (1 / F**2 - 1)) ** 2  # square of their product
+        spread = np.sqrt((normal - tangent / lam) ** 2 + 4 * mixed / lam)
+        elastic = 0.5 * (normal + tangent / lam + spread)
+        largest = float((elastic + mu * normal).max())
+        return bound * (largest / (max(1.0, 1 / lam) + mu))
 
     @cached_property
     def first_loading(self) -> FirstLoading:

@@ -4,14 +4,20 @@ import numpy as np
 
 from ..parameters.bond import Bond
 from ..support.checks import Array
-from .element import Element, Share
+from .element import Element, ElementResponse
 
 
 class Bonded(Element):
     """The bond of a joint, with its damage."""
 
+    native_name = "bonded"
+
     def __init__(self, bond: Bond) -> None:
-        self.bond, self.rows = bond, {"damage": 1}
+        self.bond = bond
+        self.rows = {"damage": 1}
+        self.tensile_strength = bond.tension
+        self.tensile_opening = float(1.0 / bond.limits[1][0])
+        self.tensile_stiffness = bond.normal_stiffness
 
     def numbers(self) -> dict[str, float]:
         begin, end = self.bond.limits
@@ -24,7 +30,9 @@ class Bonded(Element):
             "inverse_failure_slip": float(end[1]),
         }
 
-    def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:
+    def step(
+        self, delta: Array, d: Array, state: Array, new: Array, tangent: bool
+    ) -> ElementResponse:
         """As `Element.step`.
 
         1. Damage D is what opening and slip ask for, and never less than before.
@@ -48,7 +56,7 @@ class Bonded(Element):
         rate = np.divide(rate, slope, out=np.zeros_like(u), where=softens)
         acts = np.stack([u[0] < 0.0, *[damage >= 0.0] * (len(u) - 1)])
         whole = np.eye(len(u))[:, :, None] * ((1.0 - damage) * K * acts)
-        return Share((1.0 - damage) * K * u, lost, whole - (K * u)[:, None] * rate[None])
+        return ElementResponse((1.0 - damage) * K * u, lost, whole - (K * u)[:, None] * rate[None])
 
     def stored(self, delta: Array, state: Array) -> Array:
         return (1.0 - state[0]) * self._energy(self._opened(delta)[0])[1]
@@ -56,6 +64,15 @@ class Bonded(Element):
     def stiffness(self, delta: Array, state: Array) -> Array:
         """As `Element.stiffness`; softening, which lowers it, is left out."""
         return (1.0 - state[0]) * max(self.bond.normal_stiffness, self.bond.shear_stiffness)
+
+    def shear_stiffness(self, delta: Array, stress: float) -> float:
+        """As `Element.shear_stiffness`, of the whole bond."""
+        return self.bond.shear_stiffness if len(delta) > 1 else 0.0
+
+    def first_loading_stiffness(self, closure: Array, reduction: float) -> Array:
+        """As `Element.first_loading_stiffness`: a reduction divides shear stiffness by F^2."""
+        shear = self.bond.shear_stiffness / reduction**2
+        return np.full(closure.shape, max(self.bond.normal_stiffness, shear))
 
     def _opened(self, delta: Array) -> tuple[Array, Array]:
         """Opening and slip u (dim, B), and their stiffnesses (dim, 1)."""

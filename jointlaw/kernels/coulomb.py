@@ -13,7 +13,7 @@ from ..support.thresholds import (
     ROUNDING_TOLERANCE,
     SEPARATED_STATE,
 )
-from .element import Element, Measures, Share
+from .element import Element, ElementResponse, Measures
 
 
 class Slid(NamedTuple):
@@ -36,6 +36,7 @@ class Coulomb(Element):
     residual value None keeps the value.
     """
 
+    native_name = "coulomb"
     parted = SEPARATED_STATE
 
     def __init__(self, p: Any, dim: int) -> None:
@@ -51,6 +52,9 @@ class Coulomb(Element):
         # beyond cohesion/friction there is no strength in shear
         apex = self.cohesion / self.friction if self.friction > 0.0 else np.inf
         self.tension = min(p.tension, apex)
+        self.tensile_strength = self.tension
+        self.tensile_opening = self.tension / self.normal
+        self.tensile_stiffness = self.normal
         self.reach = MAX_STRENGTH / max(self.normal * (1.0 + self.friction), self.shear, 1.0)
         self.farthest = self.reach
 
@@ -66,7 +70,9 @@ class Coulomb(Element):
             "coulomb_weakening_length": self.weakening,
         }
 
-    def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:
+    def step(
+        self, delta: Array, d: Array, state: Array, new: Array, tangent: bool
+    ) -> ElementResponse:
         """As `Element.step`; the normal stress sigma = kn u, u the closure, goes straight.
 
         1. An intact joint bears sigma >= -tension with |q| <= c + mu sigma. A straight step leaves
@@ -113,7 +119,7 @@ class Coulomb(Element):
         if tangent:
             C = self.tangent(np.where(apart, SEPARATED_STATE, w), end, self.shear * share, slid)
             C = np.where(touches, C, 0.0)
-        return Share(F, lost, C)
+        return ElementResponse(F, lost, C)
 
     def slide(self, q: Array, w: Array, dq: Array, start: Array, end: Array) -> Slid:
         """Shear by dq while the normal stress goes from `start` to `end`.
@@ -193,6 +199,18 @@ class Coulomb(Element):
         slides = self.normal * np.hypot(1.0, np.where(mu < INFINITE_FRICTION, mu, 0.0))
         bound = np.maximum(slides, self.shear)
         return np.where((state[-1] > 0.0) & (delta[0] < 0.0), 0.0, bound)
+
+    def first_loading_stiffness(self, closure: Array, reduction: float) -> Array:
+        """As `Element.first_loading_stiffness`: the norm of a tangent with friction, over F."""
+        mu = (
+            self.friction if self.friction < INFINITE_FRICTION else 0.0
+        )  # a joint that never slides
+        slides = self.normal * np.hypot(1.0, mu / reduction)
+        return np.full(closure.shape, np.maximum(slides, self.shear / reduction**2))
+
+    def shear_stiffness(self, delta: Array, stress: float) -> float:
+        """As `Element.shear_stiffness`, of a joint that sticks."""
+        return self.shear if len(delta) > 1 else 0.0
 
     def measures(self, delta: Array, state: Array) -> Measures:
         q, w, u = state[:-1], state[-1], delta[0]

@@ -9,7 +9,7 @@ import numpy as np
 from ..support.checks import Array
 
 
-class Share(NamedTuple):
+class ElementResponse(NamedTuple):
     """What an element of B joints adds in a step."""
 
     F: Array  # (dim, B) in Pa
@@ -34,19 +34,25 @@ class Element(ABC):
     mated position in m, `state` (rows, B) the element's own rows of the state; zeros are virgin.
     """
 
+    native_name = ""  # of its number in native/layout.py; empty: it runs by the numpy kernel alone
     dim = 1  # components of a displacement that it needs, at least
     rows: dict[str, int]  # of its state: how many, by name
     parted = 1.0  # damage of joints whose faces meet anew
+    tensile_strength = 0.0  # Pa: largest tension of an intact joint
+    tensile_opening = 0.0  # m: an intact joint bears tension up to this opening
+    tensile_stiffness = 0.0  # Pa/m: normal stiffness of an intact joint up to that opening
     stretch = 1.0  # bound of the closure that it feels over the size of the displacement
     reach = math.inf  # m: up to this closure its forces, energies and their squares stay finite
     farthest = 1e304  # m: largest closure that a normal stress is looked for in
 
-    @abstractmethod
     def numbers(self) -> dict[str, float]:
         """Its numbers in `struct jlaw_law`, by the names of native/layout.py."""
+        return {}
 
     @abstractmethod
-    def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:
+    def step(
+        self, delta: Array, d: Array, state: Array, new: Array, tangent: bool
+    ) -> ElementResponse:
         """Advance from `delta` by d (dim, B) in m, from `state` to `new`, which is written."""
 
     @abstractmethod
@@ -69,6 +75,28 @@ class Element(ABC):
         """Upper bound (...) of `|C|` in Pa/m up to this closure and this shear (...) in m."""
         virgin = np.zeros((sum(self.rows.values()), 1))
         return self.stiffness(np.zeros((self.dim, 1)), virgin)[0] + 0.0 * (closure + shear)
+
+    def shear_stiffness(self, delta: Array, stress: float) -> float:
+        """Elastic shear stiffness in Pa/m of first loading to `delta` (dim, 1), a closure in m.
+
+        stress: the normal stress in Pa that the element bears there. The default is the tangent of
+        a zero increment.
+        """
+        start = np.zeros_like(delta)
+        virgin = np.zeros((sum(self.rows.values()), 1))
+        closed = virgin.copy()
+        self.step(start, delta, virgin, closed, False)
+        C = self.step(delta, start, closed, closed.copy(), True).C
+        return 0.0 if C is None or len(delta) == 1 else float(C[1, 1, 0])
+
+    def first_loading_stiffness(self, closure: Array, reduction: float) -> Array:
+        """Upper bound (...) in Pa/m of the tangent's norm on first loading to this closure (...).
+
+        reduction: the factor F of a strength reduction, by which a host divides shear displacement
+        and shear stress (`Law.strength_reduced`); 1 for none.
+        """
+        bound = self.largest_stiffness(closure, np.zeros(()))
+        return bound * max(1.0, reduction**-2)
 
     def stored(self, delta: Array, state: Array) -> Array:
         """Elastic energy (B,) in J/m2."""

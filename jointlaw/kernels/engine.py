@@ -21,7 +21,7 @@ from ..native.library import address
 from ..support.checks import Array, one_of
 from . import reference
 from .pack import pack
-from .reference import Tables
+from .reference import LawTables
 from .threads import share_out, thread_count
 
 Index = NDArray[np.intp]
@@ -70,7 +70,7 @@ class Step:
         return self.__dict__ | {"call": (None, None)}  # it holds addresses
 
 
-def engine(tables: Tables) -> "NumpyEngine | NativeEngine":
+def engine(tables: LawTables) -> "NumpyEngine | NativeEngine":
     """The engine of a law's tables, which all its joints share: it holds nothing of theirs."""
     choice = os.environ.get("JOINTLAW_KERNEL", "")
     if choice:
@@ -79,8 +79,14 @@ def engine(tables: Tables) -> "NumpyEngine | NativeEngine":
 
 
 @lru_cache(maxsize=64)
-def _engine(tables: Tables, choice: str) -> "NumpyEngine | NativeEngine":
-    loaded = None if choice == "numpy" else library.load()
+def _engine(tables: LawTables, choice: str) -> "NumpyEngine | NativeEngine":
+    if tables.python_only and choice == "native":
+        raise ImportError(
+            f"JOINTLAW_KERNEL = 'native', but the element {tables.python_only[0]} has no C version"
+        )
+    if tables.python_only or choice == "numpy":
+        return NumpyEngine(tables)
+    loaded = library.load()
     if loaded is not None:
         return NativeEngine(tables, loaded)
     if choice == "native":
@@ -100,7 +106,7 @@ class NumpyEngine:
 
     name = "numpy"
 
-    def __init__(self, tables: Tables) -> None:
+    def __init__(self, tables: LawTables) -> None:
         self.tables, self.rows = tables, tables.rows  # rows of a block
 
     def advance(self, state: Array, step: Step, ledger: bool) -> None:
@@ -140,7 +146,7 @@ class NativeEngine:
 
     name = "native"
 
-    def __init__(self, tables: Tables, loaded: ctypes.CDLL) -> None:
+    def __init__(self, tables: LawTables, loaded: ctypes.CDLL) -> None:
         numbers, arrays = pack(tables)
         # kept, for the structure points to them
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}

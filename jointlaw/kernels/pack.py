@@ -8,14 +8,21 @@ from ..native.layout import ARRAYS, FACET_LANES, INTEGERS, LARGEST_FLOAT, REALS,
 from ..support.checks import Array
 from .asperities import Asperities, strength
 from .cells import compliance
-from .reference import Tables
+from .reference import LawTables
 
 
-def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
+def pack(k: LawTables) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` by name, in its order.
 
-    Raises KeyError for an element or a number that native/layout.py does not name.
+    Raises ValueError for an element without C, and KeyError for a number that native/layout.py does
+    not name.
     """
+    if k.python_only:
+        raise ValueError(
+            f"the element {k.python_only[0]} has no C version, so this law has no tables for C "
+            "hosts: use it in Python, or write its functions in native/elements.h and name it in "
+            "native/layout.py"
+        )
     numbers: dict[str, int | float] = dict.fromkeys(INTEGERS, 0) | dict.fromkeys(REALS, 0.0)
     arrays = {name: np.zeros(0) for name in ARRAYS}
     found = {
@@ -23,9 +30,10 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
         "max_effective_closure": min(element.reach for element in k.elements),
         "max_search_closure": min(min(one.reach, one.farthest) for one in k.elements),
         "closure_per_displacement": k.stretch,
+        "tensile_opening": max(element.tensile_opening for element in k.elements),
     }
     for element in k.elements:
-        found |= {type(element).__name__.lower(): 1, **element.numbers()}
+        found |= {element.native_name: 1, **element.numbers()}
         if isinstance(element, Asperities):
             arrays |= _arrays(element.k, element.first_loading.yielding)
     if missing := found.keys() - numbers.keys():
@@ -35,7 +43,7 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
 
 
 def _arrays(k: FacetTables, late: tuple[Array, Array] | None) -> dict[str, Array]:
-    """Tables of facets, in blocks; late: what yielding takes off first loading, `yield_sum`."""
+    """LawTables of facets, in blocks; late: what yielding takes off first loading, `yield_sum`."""
     columns = {
         "M": k.m.T,
         "S": k.s.T,

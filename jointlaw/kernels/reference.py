@@ -25,7 +25,7 @@ from .mating import first_touch
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
+class LawTables:
     """All that a kernel reads of a law: its elements. The first tells what slips and touches."""
 
     dim: int  # components of a displacement: 3, 2 in one plane, 1 for closure alone
@@ -52,6 +52,15 @@ class Tables:
         """The tables of the asperities, if the law has any."""
         first = self.elements[0]
         return first.k if isinstance(first, Asperities) else None
+
+    @cached_property
+    def python_only(self) -> list[str]:
+        """Names of the classes of elements without C: the law runs by the numpy kernel.
+
+        A subclass of an element with C counts as one without, unless it has a `native_name` too.
+        """
+        kinds = [type(element) for element in self.elements]
+        return [kind.__name__ for kind in kinds if not vars(kind).get("native_name")]
 
     @property
     def sliders(self) -> int:
@@ -93,7 +102,7 @@ class Tables:
             at = end
 
 
-def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
+def step(k: LawTables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
     """Advance joints by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B).
 
     The displacement grows by d; tractions, tangents and losses of the elements add up. Their own
@@ -112,7 +121,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     return new, F, C
 
 
-def parts(k: Tables, state: Array) -> SimpleNamespace:
+def parts(k: LawTables, state: Array) -> SimpleNamespace:
     """Views of the parts of a state array by name, as rows (B,) where there is one of a kind.
 
     Those of asperities as `asperities.State` has them, and the share of the slopes that is left.
@@ -128,19 +137,19 @@ def parts(k: Tables, state: Array) -> SimpleNamespace:
     return SimpleNamespace(**named)
 
 
-def traction(k: Tables, state: Array) -> Array:
+def traction(k: LawTables, state: Array) -> Array:
     """Traction F (dim, B) in Pa that a state carries."""
     bear = [element.traction(state[: k.dim], own) for element, (own,) in k.own(state)]
     return np.sum(bear, axis=0)
 
 
-def stiffness(k: Tables, state: Array) -> Array:
+def stiffness(k: LawTables, state: Array) -> Array:
     """Upper bound (B,) of `|C|` in Pa/m of joints in these states."""
     bounds = [element.stiffness(state[: k.dim], own) for element, (own,) in k.own(state)]
     return np.sum(bounds, axis=0)
 
 
-def measures(k: Tables, state: Array) -> Measures:
+def measures(k: LawTables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
     delta = state[: k.dim]
     (first, (own,)), *others = k.own(state)

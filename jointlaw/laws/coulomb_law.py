@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from ..kernels.coulomb import Coulomb
-from ..kernels.reference import Tables
+from ..kernels.reference import LawTables
 from ..parameters.bond import LARGEST
 from ..parameters.declared import check, declared, parameter
+from ..support.checks import more_than
 from .law import DEFAULT_STRESS, Law
 
 
@@ -69,7 +74,43 @@ class CoulombLaw(Law, kind="coulomb"):
         return DEFAULT_STRESS / self.normal_stiffness
 
     @cached_property
-    def tables(self) -> Tables:
+    def tables(self) -> LawTables:
         """As `Law.tables`."""
         dim = 3 if self.plane is None else 2
-        return Tables(dim, (Coulomb(self, dim),))
+        return LawTables(dim, (Coulomb(self, dim),))
+
+    def secant_stiffness(self, normal_stress: float) -> tuple[float, float]:
+        """As `Law.secant_stiffness`: the two constants."""
+        if len(self.tables.elements) > 1:
+            return super().secant_stiffness(normal_stress)
+        more_than("normal_stress", normal_stress, 0.0)
+        return self.normal_stiffness, self.shear_stiffness if self.dim > 1 else 0.0
+
+    def first_loading_stiffness(self, closure: ArrayLike, reduction: float = 1.0) -> Any:
+        """As `Law.first_loading_stiffness`.
+
+        `max_stiffness` has the friction in it, for the coupling of shear to closure, which has no
+        eigenvalue of its own: the eigenvalues of (kn, 0; mu kn, 0) are kn and 0.
+        """
+        if len(self.tables.elements) > 1:
+            return super().first_loading_stiffness(closure, reduction)
+        y = self._within_reach(closure)
+        shear = self.shear_stiffness / more_than("reduction", reduction, 0.0) ** 2
+        return np.full(y.shape, max(self.normal_stiffness, shear))[()]
+
+    def strength_reduced(self, factor: float) -> Self:
+        """As `Law.strength_reduced`.
+
+        Raises ValueError for a factor that is not > 0, and NotImplementedError for a subclass with
+        elements of its own that does not define the method.
+        """
+        factor = more_than("factor", factor, 0.0)
+        inherited = type(self).strength_reduced is CoulombLaw.strength_reduced
+        if len(self.tables.elements) > 1 and inherited:
+            super().strength_reduced(factor)
+        return replace(
+            self,
+            tension=self.tension / factor,
+            shear_stiffness=self.shear_stiffness * factor**2,
+            weakening=self.weakening / factor,
+        )

@@ -17,10 +17,10 @@ from ..joints.batch import JointBatch, stable_step
 from ..joints.joint import Joint
 from ..joints.seat import seat
 from ..kernels.engine import Step, engine
-from ..kernels.reference import Tables
+from ..kernels.reference import LawTables
 from ..parameters import keys, toml
 from ..parameters.declared import fingerprint, parameters_of
-from ..support.checks import Array, booleans, finite
+from ..support.checks import Array, booleans, finite, more_than
 from ..support.files import replace_file
 
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
@@ -46,7 +46,7 @@ class Law:
 
     @cached_property
     @abstractmethod
-    def tables(self) -> Tables:
+    def tables(self) -> LawTables:
         """What the kernels read."""
 
     # ----------------------------------------------------------------- joints
@@ -167,6 +167,71 @@ class Law:
     def crushed(self, closure: float) -> float:
         """Share of the asperities in touch at this closure (m), if they have heights; else 0."""
         return 0.0
+
+    # ----------------------------------------------- tension, strength, stiffness
+
+    @property
+    def tensile_strength(self) -> float:
+        """Upper bound (Pa) of the tension that an intact joint bears, without shear; 0 if none."""
+        return sum(element.tensile_strength for element in self.tables.elements)
+
+    @property
+    def tensile_opening(self) -> float:
+        """Opening (m) up to which an intact joint bears tension; 0 where it bears none.
+
+        A host keeps a joint at least until it has opened this far, or `JointBatch.damage` is 1.
+        """
+        return max(element.tensile_opening for element in self.tables.elements)
+
+    @property
+    def tensile_stiffness(self) -> float:
+        """Normal stiffness (Pa/m) of an intact joint that opens, up to `tensile_opening`."""
+        return sum(element.tensile_stiffness for element in self.tables.elements)
+
+    def secant_stiffness(self, normal_stress: float) -> tuple[float, float]:
+        """Secant stiffness in closure and elastic stiffness in shear (Pa/m) at a normal stress.
+
+        normal_stress: in Pa, > 0, of first loading without shear. Shear stiffness is that of joints
+        that do not slide; 0 for a law of closure alone. Raises ValueError as `closure` does.
+        """
+        stress = more_than("normal_stress", normal_stress, 0.0)
+        closure = self.closure(stress)
+        delta = np.zeros((self.dim, 1))
+        delta[0] = closure
+        first, *others = self.tables.elements
+        borne = [float(element.normal_stress(np.array(closure))) for element in others]
+        shear = first.shear_stiffness(delta, stress - sum(borne))
+        for element, part in zip(others, borne, strict=True):
+            shear += element.shear_stiffness(delta, part)
+        return float(stress / closure), shear
+
+    def first_loading_stiffness(self, closure: ArrayLike, reduction: float = 1.0) -> Any:
+        """Upper bound (Pa/m) of the eigenvalues of C in first loading to this closure (m).
+
+        It bounds the frequency of a mass on the joint. At a given normal stress the unsheared joint
+        is the stiffest one, so a bound at its stress holds for sheared joints as well.
+        reduction: the factor F (> 0) of a strength reduction, inside which this law stands; shear
+        displacement and shear stress are divided by it. Raises ValueError as `normal_stress` does.
+        """
+        y = self._within_reach(closure)
+        factor = more_than("reduction", reduction, 0.0)
+        each = [one.first_loading_stiffness(y, factor) for one in self.tables.elements]
+        return np.sum(each, axis=0)[()]
+
+    def strength_reduced(self, factor: float) -> Self:
+        """The law to use inside a reduction of the strength by `factor`, F > 0.
+
+        A host that divides shear displacements by F, and the shear stress that this law returns for
+        them by F, has a joint whose strength and dilation (tan phi, c, tension, tan psi) are those
+        of the law divided by F, and which is as stiff. No energy is created, as work is the same
+        inside and outside. Exact for Coulomb's joint; docs/blocks.md has the errors of rough ones.
+
+        Raises NotImplementedError for a class that does not define it.
+        """
+        raise NotImplementedError(
+            f"{type(self).__name__} defines no strength_reduced(factor): return the law with its "
+            "tension divided by the factor and its shear stiffness multiplied by its square"
+        )
 
     # ------------------------------------------------- stiffness and time step
 

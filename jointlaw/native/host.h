@@ -74,6 +74,13 @@ JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_
  * virgin one. In both cases the bond of the law is broken. */
 JLAW_FUNCTION int jlaw_init_unmated(const jlaw_law *law, double *s);
 
+/* Opening (m) up to which an intact joint bears tension; 0 where it bears none. A host keeps a joint at
+ * least until it has opened this far. */
+JLAW_FUNCTION double jlaw_tensile_opening(const jlaw_law *law);
+/* Whether joints have a bond or cohesion that can break; and break it, as of faces that meet anew */
+JLAW_FUNCTION int jlaw_has_damage(const jlaw_law *law);
+JLAW_FUNCTION void jlaw_break_bond(const jlaw_law *law, double *s);
+
 /* jlaw_update without its checks, for hosts that validate their steps and for GPUs. Row i of the state
  * is s[i stride], so that joints may be stored side by side, (rows, n). C may be NULL. */
 JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
@@ -389,17 +396,30 @@ JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
 JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return jl_state_rows(law); }
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
+JLAW_FUNCTION double jlaw_tensile_opening(const jlaw_law *law) { return law->tensile_opening; }
+
+JLAW_FUNCTION int jlaw_has_damage(const jlaw_law *law)
+{
+  return jl_state_rows(law) > jl_element_row(law);
+}
+
+JLAW_FUNCTION void jlaw_break_bond(const jlaw_law *law, double *s)
+{
+  double *row = s + jl_element_row(law);
+  const int rows[] = JLAW_ELEMENT_ROWS(law);
+  for (int i = 0; rows[i] >= 0; row += rows[i++]) /* the last row of an element is its damage */
+    if (rows[i]) row[rows[i] - 1] = jlaw_separated_damage_(law);
+}
+
 JLAW_FUNCTION int jlaw_init_unmated(const jlaw_law *law, double *s)
 {
   const int separates = law->interlock_decays && law->dim > 1;
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
   if (separates) s[0] = law->first_touch_closure, s[1] = JLAW_UNMATED_DISTANCE * law->mating_length;
-  double *row = s + jl_element_row(law);
-  const int rows[] = JLAW_ELEMENT_ROWS(law);
-  for (int i = 0; rows[i] >= 0; row += rows[i++])
-    if (rows[i]) row[rows[i] - 1] = jlaw_separated_damage_(law);
+  jlaw_break_bond(law, s);
   return separates ? 0 : -1;
 }
+
 JLAW_FUNCTION double jlaw_dissipated_energy(const jlaw_law *law, const double *s)
 {
   return s[law->dim];

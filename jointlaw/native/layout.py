@@ -92,6 +92,7 @@ REALS = {
     "engagement_stiffness_limit": Field("0", "DBL_MAX", "upper limit of the same stiffness"),
     "max_effective_closure": Field("0", "DBL_MAX", "m: bound of |y|"),
     "closure_per_displacement": Field("1", "DBL_MAX", "bound of |y| over |displacement|"),
+    "tensile_opening": Field("0", "DBL_MAX", "m: an intact joint bears tension up to it"),
     "max_search_closure": Field("0", "DBL_MAX", "m: upper end of the search for a closure"),
 }
 ARRAYS = {

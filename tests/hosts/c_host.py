@@ -40,6 +40,7 @@ def library(folder, *flags, cc="cc", more=""):
         "max_stiffness",
         "stored_energy",
         "dissipated_energy",
+        "tensile_opening",
     ):
         getattr(lib, f"jlaw_{function}").restype = ctypes.c_double
     lib.jlaw_read.restype, lib.jlaw_fingerprint.restype = pointer, ctypes.c_char_p

@@ -110,6 +110,13 @@ def test_both_forms_of_the_tables_give_what_python_gives(lib, tmp_path, i):
             apart = law.joint(mated=False)
         assert lib.jlaw_init_unmated(one.law, at(one.state)) == (0 if apart.delta.any() else -1)
         np.testing.assert_array_equal(one.state, apart.snapshot().values[0])
+        assert lib.jlaw_tensile_opening(one.law) == law.tensile_opening
+        assert lib.jlaw_has_damage(one.law) == ("damage" in law.tables.names)
+        intact, broken = law.joints(1), law.joints(1)
+        broken.unbond([0])
+        one.state[:] = intact.snapshot().values[0]
+        lib.jlaw_break_bond(one.law, at(one.state))
+        np.testing.assert_array_equal(one.state, broken.snapshot().values[0])
 
 
 @pytest.mark.parametrize(

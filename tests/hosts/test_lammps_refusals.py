@@ -67,7 +67,8 @@ CASES = {
     "suffix": ("units si", "package omp 1\nsuffix omp\nunits si", "no version for the suffix omp"),
     "law changed": ("run 2", f"run 2\n{STYLE}\npair_coeff * * block.jlaw\nrun 2",
                     "there are joints of other laws"),
-    "bond": (f"1e-3\n{COEFF}", "3e-5\npair_coeff * * bonded.jlaw", "holds until the joint is 4"),
+    "bond": (f"1e-3\n{COEFF}", "3e-5\npair_coeff * * bonded.jlaw",
+             "bears tension until the joint is 4"),
     "tension": (f"1e-3\n{COEFF}", "9e-6\npair_coeff * * coulomb.jlaw",
                 "bears tension until the joint is 1e-05 m"),
 }  # fmt: skip

@@ -11,8 +11,7 @@ from scipy.optimize import brentq
 
 import jointlaw as jl
 from dem_demo import parse
-from dem_demo.contact.joints import stiffness_bound
-from dem_demo.studies.strength import FACTOR, factor_of_safety, stiffened
+from dem_demo.studies.strength import FACTOR, factor_of_safety
 
 WEIGHT = 2600.0 * 9.81  # N/m3
 FRICTION = math.tan(math.radians(50.0))
@@ -73,7 +72,7 @@ def rough_law(**changes):
 
 def shear_curve(law, stress, factor):
     """Sliding (m), shear stress (Pa) of a law in a reduction, and its normal stiffness (Pa/m)."""
-    inside = stiffened(law, factor)
+    inside = law.strength_reduced(factor)
     record = jl.direct_shear(
         inside.joint(), to=[1e-8 / factor, 6e-3 / factor], normal=stress, steps=400
     )
@@ -111,7 +110,7 @@ def test_no_tangent_in_a_reduction_exceeds_the_bound_of_the_time_step(kind, fact
         "coulomb": jl.CoulombLaw(1e10, 5e9, 0.7, 1e4, plane=0.0),
     }[kind]  # fmt: skip
     rng = np.random.default_rng(3)
-    inside = stiffened(law, factor)
+    inside = law.strength_reduced(factor)
     batch = inside.joints(100, normal_stress=10 ** rng.uniform(3, 6.5, 100))
     scale = np.array([1.0, 1.0 / factor])
     for _ in range(60):
@@ -120,5 +119,5 @@ def test_no_tangent_in_a_reduction_exceeds_the_bound_of_the_time_step(kind, fact
         step = np.stack([size * np.cos(way), size * np.sin(way) / factor], axis=1)
         _, C = batch.update(step)
         largest = np.abs(np.linalg.eigvals(scale[:, None] * C * scale)).max(axis=1)
-        bound = stiffness_bound(inside, np.maximum(batch.delta[:, 0], 1e-12), factor)
+        bound = inside.first_loading_stiffness(np.maximum(batch.delta[:, 0], 1e-12), factor)
         assert (largest <= bound * (1 + 1e-9)).all()

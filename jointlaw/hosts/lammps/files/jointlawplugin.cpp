@@ -293,14 +293,10 @@ void PairJointlaw::coeff(int narg, char **arg)
       MPI_Allreduce(&read, &all, 1, MPI_INT, MPI_MIN, world);
       if (!all) error->all(FLERR, "pair_coeff jointlaw: {}", message);
       laws.push_back({arg[2], law});
-      if (law->bonded && opening * law->inverse_failure_opening < 1.0)
-        error->all(FLERR, "pair_coeff jointlaw: the bond of {} holds until the joint is {} m open, but "
-                   "joints are given up at opening {} m: give pair_style a larger opening", arg[2],
-                   1.0 / law->inverse_failure_opening, opening);
-      if (law->coulomb && opening * law->coulomb_normal_stiffness < law->coulomb_tension)
+      if (opening < jlaw_tensile_opening(law))
         error->all(FLERR, "pair_coeff jointlaw: {} bears tension until the joint is {} m open, but "
                    "joints are given up at opening {} m: give pair_style a larger opening", arg[2],
-                   law->coulomb_tension / law->coulomb_normal_stiffness, opening);
+                   jlaw_tensile_opening(law), opening);
       if (jlaw_dim(law) != 3)
         error->all(FLERR, "pair_coeff jointlaw: {} is a law for {}; export one for space (no `{}` in "
                    "its parameters)", arg[2], jlaw_dim(law) == 1 ? "closure alone" : "motion in a plane",
@@ -581,10 +577,9 @@ void PairJointlaw::advance(const Contact &c)
   int which = 0;
   while (which < own.n && to_whole(own.at(which, size)[rows + KEY]) != c.key) which++;
   const bool fresh = which == own.n;
-  const bool holds = law->bonded || law->coulomb;
   if (fresh) {
     // what is drawn to touch does so but for rounding, and may have a bond
-    const double touch = holds && update->setupflag ? -1e-9 * sqrt(dot(c.arm_i, c.arm_i)) : 0.0;
+    const double touch = jlaw_has_damage(law) && update->setupflag ? -1e-9 * sqrt(dot(c.arm_i, c.arm_i)) : 0.0;
     if (!(c.closure > touch)) return;
     own.resize(which + 1, size);
     double *head = own.at(which, size) + rows;
@@ -592,8 +587,7 @@ void PairJointlaw::advance(const Contact &c)
     head[OF_AREA] = c.area;
     const Vector axis = across(c.n);
     std::copy(axis.begin(), axis.end(), head + AXIS);
-    if (holds && !update->setupflag)    // faces that meet anew: the last number is its damage
-      own.at(which, size)[jlaw_state_size(law) - 1] = jlaw_separated_damage_(law);
+    if (!update->setupflag) jlaw_break_bond(law, own.at(which, size));    // faces that meet anew
   }
   const int flag = fresh ? -1 : visits.back().flags + which;
   if (!fresh) seen[flag] = MET;

@@ -1,0 +1,56 @@
+"""A law with an element from outside the package in a block scene and in strength reduction."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from own_law import CLAY, ClayLaw
+from scene_text import block, coulomb
+
+import jointlaw as jl
+from dem_demo import Simulation, parse
+from dem_demo.studies.strength import FACTOR, factor_of_safety
+
+SLOPE = math.radians(35.0)
+WEIGHT = 2600.0 * 9.81 * 2.0 * 0.4  # N/m
+
+
+def slab_scene(law):
+    """A slab 2 m long on a plane, gravity turned by the slope."""
+    g = 9.81 * np.array([math.sin(SLOPE), -math.cos(SLOPE)])
+    text = (
+        f"gravity = [{g[0]}, {g[1]}]\ndensity = 2600.0\n[laws.joint]\n"
+        + coulomb(0.6, 1e10, 5e9)
+        + block("base", corners=[(-3, -1), (3, -1), (3, 0), (-3, 0)], fixed=True)
+        + block("slab", corners=[(-1, 0), (1, 0), (1, 0.4), (-1, 0.4)])
+        + "[run]\nend = 0.05\n"
+    )
+    scene = parse(text)
+    return replace(scene, laws={"joint": law})
+
+
+def test_blocks_step_a_law_from_outside_the_package():
+    """At rest it bears the weight of the slab, whose joint alone would slide."""
+    sim = Simulation(slab_scene(CLAY))
+    for _ in range(50):
+        sim.step()
+    forces = np.array([WEIGHT * math.cos(SLOPE), WEIGHT * math.sin(SLOPE)])
+    area = 1.0  # m2 of each of two contacts
+    assert area * sim.joints.traction.sum(axis=0) == pytest.approx(forces, rel=1e-3)
+    assert WEIGHT * math.sin(SLOPE) > CLAY.friction * WEIGHT * math.cos(SLOPE)
+
+
+def test_factor_of_safety_is_that_of_both_strengths():
+    """Friction and the clay's strength, over the weight along the slope."""
+    strength = CLAY.friction * WEIGHT * math.cos(SLOPE) + CLAY.clay_strength * 2.0
+    expected = strength / (WEIGHT * math.sin(SLOPE))
+    assert factor_of_safety(slab_scene(CLAY)) == pytest.approx(expected, rel=1.1 * FACTOR[2])
+
+
+def test_a_scene_names_its_kind(monkeypatch):
+    monkeypatch.setitem(jl.Law.kinds, "clay", ClayLaw)
+    laws = CLAY.to_toml().replace("version = 1", "#")
+    base = 'gravity = [0.0, -9.81]\n[[block]]\nname = "b"\nbox = [1.0, 1.0]\nat = [0.0, 0.0]\n'
+    scene = parse(f"{base}[run]\nend = 0.1\n[laws.joint]\n{laws}")
+    assert scene.laws["joint"] == CLAY

@@ -1,4 +1,4 @@
-"""Calls the compiled step of the blocks, `dem_demo/native/blocks.c`.
+"""Calls the compiled step and relaxation of the blocks, `dem_demo/native`.
 
 Python owns every array, and the library holds their addresses: arrays are changed in place. When
 the number of contacts changes there are new arrays, and a new `StepArrays` with their addresses.
@@ -20,7 +20,7 @@ REBUILD = "run `python -m dem_demo.native` to build it anew"
 DOUBLE = ctypes.c_double
 INTEGER = ctypes.c_longlong
 POINTER = ctypes.c_void_p
-# Arguments of each function after the `StepArrays`, and what it returns
+# Arguments of each function after its structure, and what it returns
 FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "locate_contacts": ([], None),
     "next_contacts": ([POINTER] * 2, None),
@@ -31,6 +31,8 @@ FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "read_joints": ([], None),
     "compute_forces": ([DOUBLE], None),
     "finish_step": ([DOUBLE], None),
+    "compute_unbalanced": ([], ctypes.c_int),
+    "relax": ([INTEGER], ctypes.c_int),
 }
 
 
@@ -40,10 +42,14 @@ class LawJointArrays(ctypes.Structure):
     _fields_ = [(name, field.ctype) for name, field in layout.LAW_JOINTS.items()]
 
 
-class StepArrays(ctypes.Structure):
-    """`dem_step` of layout.h: numbers of a step, and addresses of its arrays."""
+class RelaxedLaw(ctypes.Structure):
+    """`dem_relaxed_law` of layout.h: the joints of one law in a relaxation."""
 
-    _fields_ = [(name, field.ctype) for name, field in layout.STEP.items()]
+    _fields_ = [(name, field.ctype) for name, field in layout.RELAXED_LAW.items()]
+
+
+class Arrays(ctypes.Structure):
+    """A structure of numbers and of addresses of arrays that functions of the library take."""
 
     def bind(self, holder: Any = None, *names: str, **arrays: Any) -> None:
         """Store the addresses of arrays, and keep the arrays alive.
@@ -58,6 +64,18 @@ class StepArrays(ctypes.Structure):
     def call(self, name: str, *arguments: Any) -> Any:
         """Call the function `dem_NAME` of the library with these arrays."""
         return getattr(library(), f"dem_{name}")(ctypes.byref(self), *arguments)
+
+
+class StepArrays(Arrays):
+    """`dem_step` of layout.h: numbers of a step, and addresses of its arrays."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.STEP.items()]
+
+
+class RelaxationArrays(Arrays):
+    """`dem_relaxation` of layout.h: numbers of a relaxation, and addresses of its arrays."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.RELAXATION.items()]
 
 
 def address(array: Any) -> int:

@@ -4,47 +4,46 @@ A run starts from static equilibrium under gravity, loads and in-situ stress. It
 problem: joints harden as they close, slide at their friction limit, and open. Some blocks have no
 equilibrium at all, and the search must find out which.
 
-Equilibrium. Newton's method finds the displacements at which the forces on all blocks vanish. The
-contacts keep their places and normals; as the displacements are small, the search is repeated at
-the places just found until they no longer change (`settle`). Blocks that touch form islands, and
-each island is damped and judged by itself.
+Equilibrium. The blocks relax from the displacements of joints that stick (`relaxation.py`), and
+Newton's method finishes. The contacts keep their places and normals; as the displacements are
+small, the search is repeated at the places just found until they no longer change (`settle`).
 
-Unstable blocks. Where Newton's method finds no equilibrium, the blocks are moved by viscous
-relaxation: drag times displacement = unbalanced force, in implicit steps, with less and less drag.
-A block that its joints can carry comes to rest, and its unbalanced force vanishes. A block that
-cannot be carried moves on, and its unbalanced force stays: it is unstable, without static
-equilibrium. Where an unstable block would be in the end has no meaning, as contacts keep their
-normals here.
+Unstable blocks. Where there is no equilibrium, some blocks go on moving at a steady rate while the
+unbalanced force no longer falls. Every block that moves by more than a hundredth of the fastest one
+is unstable, without static equilibrium. Where it would be in the end has no meaning, as contacts
+keep their normals here: it is put back to within a few closures of where it began, in the direction
+in which it moved, so that it has released the forces that it exerted on the rest. There it is fixed
+and the others are solved again; blocks that only an unstable one supported show then. In the end
+the unstable blocks creep from their places as far as it takes to release those forces.
 
-Then the search is repeated for the others, while the unstable blocks can move away and so release
-the forces that they exert on the rest. A block that only the drag of an unstable block supports is
-unstable as well: it shows in a few steps with less drag (`_find_followers`).
+A search that decides neither way counts as no equilibrium, and says so (`Verdict.NOT_DECIDED`).
 
 In-situ stress. Joints start with the closure and sliding at which they bear the given stress. The
 closure is not a displacement of the blocks, which are drawn in their places under stress: the
 contact manager keeps it as a negative closure offset.
 """
 
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
 from scipy.sparse import bmat, csc_array, csr_array, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
-from jointlaw.support.progress import track
-
 from ..contact import ContactManager, Contacts, Joints
 from ..scene import Scene
 from .blocks import Blocks, apply_loads
-from .timestep import opening_and_sliding_rates
+from .relaxation import MOVES, Relaxation, Verdict
+from .timestep import contact_kinematics, opening_and_sliding_rates
 
 MAX_UNBALANCED_RATIO = 1e-3  # unbalanced force of a stable block, relative to its weight
-UNSTABLE_RATIO = 1e-2  # least that an unstable block keeps; stable ones that follow it keep less
 STANDARD_GRAVITY = 9.81  # m/s2: for weights in a scene without gravity
 MIN_FORCE_SCALE = 1e-6  # of the largest load: lower bound of the weight in a ratio
 
 # Newton's method
 SOLUTION_TOLERANCE = 1e-11  # residual of an equilibrium, relative to the load
-STEP_TOLERANCE = 1e-8  # the same of a step of the relaxation
+STEP_TOLERANCE = 1e-8  # the same of the stick predictor
 ACCEPTED_RESIDUAL = 1e3  # tolerances: where rounding ends the iteration above one
 MAX_ITERATIONS = 60
 MAX_DAMPINGS = 20  # trials of damping in one iteration
@@ -53,18 +52,13 @@ DAMPING_DECREASE = 10.0
 MIN_DAMPING = 1e-3  # of the largest stiffness
 REGULARISATION = 1e-9  # of the least damping, so that free blocks give no singular matrix
 
-# Viscous relaxation; drags are relative to the median stiffness
-MAX_RELAXATION_STEPS = 40
-DRAG_DECREASE = 0.1  # factor of the drag after a step
-DRAG_INCREASE = 10.0  # factor after a step that did not converge
-WEAK_DRAG = 2e-3  # from here on an unbalanced force that does not fall is judged as lasting
-WEAK_DRAG_REPEATED = 1e-1  # the same where the last two steps had one drag
-LASTING_RATIO = 0.8  # unbalanced force relative to the step before, with less drag
-LASTING_RATIO_REPEATED = 0.9  # the same with the same drag
-RELEASE_DRAG = 0.01  # drag of unstable blocks while they release the others
+# Relaxation
+RELEASE_CLOSURES = 10.0  # largest closures by which an unstable block may move from its place
+RELEASE_DRAG = 0.01  # relative to the median stiffness: of unstable blocks that creep at the end
 MAX_RELEASE_STEPS = 40
-MIN_RELEASE_RATIO = 0.9  # of residuals of two steps; release ends above it
-FOLLOWER_STEPS = 6  # in which blocks that only an unstable block supports follow it
+MIN_RELEASE_RATIO = 0.9  # of residuals of two steps of creep, which ends above it
+MAX_FINISHING_ITERATIONS = 12  # of Newton's method after a relaxation
+HIGH_STRESS = 2e7  # Pa: bounds the stiffness of joints where nothing touches at first
 FIXING_DRAG = 1e25  # 1/s2: holds a block in its place
 PREDICTOR_FALL = 0.1  # of its reach: fall of a free block in the stick predictor
 
@@ -101,6 +95,15 @@ def find_unbalanced(scene: Scene, blocks: Blocks, contacts: Contacts, joints: Jo
     return unbalanced_force_ratio(blocks, unbalanced) > MAX_UNBALANCED_RATIO
 
 
+class Solution(NamedTuple):
+    """Result of a search: displacements (m,) of the free motions, unstable blocks (n,), and the
+    verdict on all other blocks."""
+
+    displacement: np.ndarray
+    unstable: np.ndarray
+    verdict: Verdict
+
+
 class EquilibriumSearch:
     """Search for a static equilibrium from the present places of the blocks.
 
@@ -124,6 +127,7 @@ class EquilibriumSearch:
         contacts = manager.contacts
         self.blocks = blocks
         self.joints = joints
+        self.contacts = contacts
         self.k = joints.n
         to_closure_and_shear = diags(np.repeat([-1.0, 1.0], self.k))
         rates = opening_and_sliding_rates(blocks, contacts)
@@ -154,62 +158,124 @@ class EquilibriumSearch:
         return out
 
     def solve(
-        self, guess: np.ndarray, unstable: np.ndarray, fixed: np.ndarray | bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Displacements (m,) at equilibrium of all blocks but the unstable ones, or new unstable
-        blocks (n,) where there is none.
+        self, start: np.ndarray, unstable: np.ndarray, name_unstable: bool = True
+    ) -> Solution:
+        """Equilibrium of all blocks but the unstable ones, from displacements `start` (m,).
 
-        guess (m,): where to begin; unstable (n,): blocks known to be unstable; fixed (n,): the ones
-        of them that stay where they are. The other unstable blocks move by a few closures, as far
-        as it takes to release their forces on the rest.
+        unstable (n,): blocks known to be unstable; they stay where they are. With `name_unstable`
+        further unstable blocks are fixed as well, and the others are solved again; else the search
+        ends with the first verdict.
         """
-        is_unstable = unstable[self.block]
-        is_fixed = (unstable & fixed)[self.block]
-        drag = max(RELEASE_DRAG * self._median_stiffness(guess), 1e3 * self.drag_of_radius)
-        min_drag = np.where(is_fixed, FIXING_DRAG, drag) * is_unstable
-        y = np.where(is_unstable, 0.0, guess)
+        known_unstable = unstable
+        unstable = unstable.copy()
+        relaxation = self._relaxation()
+        relaxation.fix(unstable)
+        verdict = Verdict.EQUILIBRIUM
+        y = start
+        while True:
+            is_fixed = unstable[self.block]
+            relaxed = relaxation.relax(self.expand(y), partial(self._finish, is_fixed))
+            moved = relaxed.y[self.blocks.is_free]
+            if relaxed.verdict is Verdict.EQUILIBRIUM:
+                if (is_released := unstable & ~known_unstable).any():
+                    moved = self._creep(moved, unstable, is_released)
+                return Solution(moved, unstable, verdict)
+            if not name_unstable:
+                return Solution(moved, unstable, relaxed.verdict)
+            if relaxed.verdict is Verdict.NOT_DECIDED:
+                verdict = relaxed.verdict
+            is_new = self._is_moving(relaxed.growth) & ~unstable
+            if not is_new.any():
+                return Solution(moved, unstable, Verdict.NOT_DECIDED)
+            unstable |= is_new
+            y = self._release(start, moved, unstable)
+            relaxation.fix(unstable)
+            if unstable[self.block].all():
+                moved = self._creep(y, unstable, unstable & ~known_unstable)
+                return Solution(moved, unstable, verdict)
+
+    def _relaxation(self) -> Relaxation:
+        """The relaxation of the blocks on the contacts of this search."""
+        joints, contacts = self.joints, self.contacts
+        opening_to_closure = np.array([-1.0, 1.0])[:, None]
+        tensile = joints.tensile_stiffness[joints.law]
+
+        def stiffness_at(closure: np.ndarray) -> np.ndarray:
+            return np.maximum(joints.interpolate("stiffness", "closure", closure), tensile)
+
+        high_stress = np.full(self.k, HIGH_STRESS)
+        return Relaxation(
+            [one.law for one in joints.by_law],
+            joints.law,
+            contacts.block_a,
+            contacts.block_b,
+            contact_kinematics(self.blocks, contacts) * opening_to_closure,
+            self.area[: self.k],
+            self.start.reshape(2, -1).T,
+            self.expand(self.force),
+            self.blocks.is_free,
+            stiffness_at,
+            np.maximum(joints.interpolate("stiffness", "stress", high_stress), tensile),
+            joints.reduction[1],
+        )
+
+    def _finish(self, is_fixed: np.ndarray, y: np.ndarray) -> np.ndarray | None:
+        """Newton's method from displacements y (n, 3); is_fixed (m,): motions that stay."""
+        start = y[self.blocks.is_free]
+        moved, _, converged = self._step(
+            start, FIXING_DRAG * is_fixed, max_iterations=MAX_FINISHING_ITERATIONS
+        )
+        return self.expand(moved) if converged.all() else None
+
+    def _distance(self, displacement: np.ndarray) -> np.ndarray:
+        """Largest displacement (n,) in m of each block at scaled displacements (n, 3)."""
+        x, y, rotation = np.abs(displacement * self.blocks.inverse_sqrt_inertia).T
+        return np.hypot(x, y) + rotation * self.blocks.radius
+
+    def _is_moving(self, growth: np.ndarray) -> np.ndarray:
+        """Blocks (n,) that move by more than a fraction of the fastest one."""
+        distance = self._distance(growth)
+        return distance > MOVES * distance.max(initial=0.0)
+
+    def _release(self, start: np.ndarray, moved: np.ndarray, unstable: np.ndarray) -> np.ndarray:
+        """Displacements (m,) from which the others are solved.
+
+        Unstable blocks (n,) have moved from `start` (m,) towards `moved` (m,) by no more than a few
+        closures.
+        """
+        closure = self.start[: self.k] + (self.kinematics @ start)[: self.k]
+        limit = RELEASE_CLOSURES * max(closure.max(initial=0.0), MIN_LENGTH)
+        distance = self._distance(self.expand(moved - start))
+        fraction = unstable * np.minimum(1.0, limit / np.maximum(distance, 1e-300))
+        return start + fraction[self.block] * (moved - start)
+
+    def _creep(self, y: np.ndarray, unstable: np.ndarray, is_released: np.ndarray) -> np.ndarray:
+        """Displacements (m,) of the start: the others in equilibrium with creeping unstable blocks.
+
+        y (m,): equilibrium with the unstable blocks (n,) fixed. The ones that `is_released` (n,)
+        creep from their places in implicit steps through a drag, until they no longer release
+        forces; so their joints are at their limits, and the result does not depend on rounding in
+        the relaxation. It is y where a step does not converge.
+        """
+        creeps = is_released[self.block]
+        creep_drag = max(RELEASE_DRAG * self._median_stiffness(y), 1e3 * self.drag_of_radius)
+        drag = np.where(creeps, creep_drag, FIXING_DRAG * unstable[self.block])
+        moved = np.where(creeps, 0.0, y)
         residual = np.inf
-        has_moving = (unstable & np.logical_not(fixed)).any()
-        for _ in range(MAX_RELEASE_STEPS if has_moving else 1):
-            solution, unbalanced, converged = self._step(y, min_drag)
-            y = np.where(converged, solution, y)
-            previous_residual = residual
-            residual = np.linalg.norm(unbalanced)
-            if not converged.all() or residual > MIN_RELEASE_RATIO * previous_residual:
-                break
-        if converged.all():
-            return y, self._find_followers(y, unstable, min_drag)
-        min_drag = np.where(converged, FIXING_DRAG, min_drag)
-        relaxed, unbalanced = self._relax(y, min_drag)
-        ratio = self._ratio(np.where(min_drag > 0, 0.0, unbalanced))
-        if ratio.max() <= MAX_UNBALANCED_RATIO:
-            # at rest, or still creeping?
-            y, _, converged = self._step(relaxed, min_drag)
-            if converged.all():
-                return y, np.zeros_like(unstable)
-        return relaxed, ratio > min(UNSTABLE_RATIO, 0.5 * ratio.max())
-
-    def _find_followers(
-        self, y: np.ndarray, unstable: np.ndarray, min_drag: np.ndarray
-    ) -> np.ndarray:
-        """Blocks (n,) that only the drag of unstable blocks supports.
-
-        The unstable blocks go on with less drag, and a block that follows them is unstable as well.
-        """
-        ratio = 0.0 * unstable
-        weak_drag = WEAK_DRAG * self._median_stiffness(y)
-        drag = np.where(min_drag < FIXING_DRAG, weak_drag, FIXING_DRAG)
-        has_moving = ((min_drag > 0) & (min_drag < FIXING_DRAG)).any()
-        for _ in range(FOLLOWER_STEPS if has_moving else 0):
-            y, unbalanced, converged = self._step(y, drag, STEP_TOLERANCE)
+        for _ in range(MAX_RELEASE_STEPS):
+            moved, unbalanced, converged = self._step(moved, drag)
             if not converged.all():
+                return y
+            previous_residual = residual
+            residual = float(np.linalg.norm(unbalanced))
+            if residual > MIN_RELEASE_RATIO * previous_residual:
                 break
-            ratio = self._ratio(np.where(drag < FIXING_DRAG, unbalanced, 0.0)) * ~unstable
-        return ratio > UNSTABLE_RATIO
+        return moved
 
-    def _ratio(self, unbalanced: np.ndarray) -> np.ndarray:
-        """Unbalanced-force ratios (n,) of scaled forces (m,)."""
-        return unbalanced_force_ratio(self.blocks, self.expand(unbalanced / self.root))
+    def _median_stiffness(self, y: np.ndarray) -> float:
+        """Median stiffness of the free motions at displacements y (m,), in 1/s2."""
+        stiffness = self._assemble_stiffness(self._unbalanced(y)[1]).diagonal()
+        return float(np.median(stiffness[stiffness > 0])) if (stiffness > 0).any() else 0.0
 
     def _assemble_stiffness(self, C: csr_array) -> csc_array:
         """Stiffness (m, m) of the blocks from the stiffness C (2 k, 2 k) of the joints."""
@@ -218,55 +284,12 @@ class EquilibriumSearch:
     def stick_predictor(self) -> np.ndarray:
         """First guess (m,): displacements if no joint can slide.
 
-        One step through a drag with which a free block falls by a tenth of its radius. Zero in
-        islands where the step does not converge.
+        One step through a drag with which a free block falls by a tenth of its radius; as near to
+        its end as Newton's method comes.
         """
         drag = self.drag_of_radius / PREDICTOR_FALL + self.zero
-        y, _, converged = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
-        return y * converged
-
-    def _median_stiffness(self, y: np.ndarray) -> float:
-        """Median stiffness of the free motions at displacements y (m,), in 1/s2."""
-        stiffness = self._assemble_stiffness(self._unbalanced(y)[1]).diagonal()
-        return float(np.median(stiffness[stiffness > 0])) if (stiffness > 0).any() else 0.0
-
-    def _relax(self, y: np.ndarray, min_drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Viscous relaxation from y (m,) until all blocks are balanced, or until the unbalanced
-        forces no longer fall.
-
-        min_drag (m,): lower bound of the drag; motions that have one are not judged. Returns
-        displacements and unbalanced forces (m,).
-        """
-        stiffness = self._median_stiffness(y)
-        drag = max(1e3 * stiffness, 1e4 * self.drag_of_radius)
-        change = DRAG_DECREASE
-        unbalanced = self.zero
-        previous_ratio: np.ndarray | float = np.inf
-        for _ in track(range(MAX_RELAXATION_STEPS), "looking for unstable blocks"):
-            solution, residual, converged = self._step(
-                y, np.maximum(drag, min_drag), STEP_TOLERANCE
-            )
-            if not converged.all():
-                drag = drag * DRAG_INCREASE
-                change = 1.0
-                previous_ratio = np.inf
-                continue
-            y = solution
-            unbalanced = residual
-            ratio = self._ratio(np.where(min_drag > 0, 0.0, unbalanced))
-            is_repeated = change == 1.0
-            lasting = LASTING_RATIO_REPEATED if is_repeated else LASTING_RATIO
-            weak_drag = WEAK_DRAG_REPEATED if is_repeated else WEAK_DRAG
-            judged = UNSTABLE_RATIO if ratio.max() > UNSTABLE_RATIO else MAX_UNBALANCED_RATIO
-            is_lasting = (ratio > lasting * previous_ratio)[ratio > judged].all()
-            # zero where all blocks fall
-            stiffness = max(stiffness, self._median_stiffness(y))
-            is_balanced = ratio.max() <= MAX_UNBALANCED_RATIO
-            if is_balanced or (is_lasting and drag < weak_drag * stiffness):
-                break
-            previous_ratio = ratio
-            drag = drag * change
-        return y, unbalanced
+        y, _, _ = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
+        return y
 
     def _unbalanced(self, y: np.ndarray, can_slide: bool = True) -> tuple[np.ndarray, csr_array]:
         """Unbalanced forces (m,) and stiffness of the joints (2 k, 2 k) at displacements y (m,)."""
@@ -286,6 +309,7 @@ class EquilibriumSearch:
         drag: np.ndarray,
         tolerance: float = SOLUTION_TOLERANCE,
         can_slide: bool = True,
+        max_iterations: int = MAX_ITERATIONS,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One implicit step from y (m,) through a drag (m,); without drag, to the equilibrium.
 
@@ -309,7 +333,7 @@ class EquilibriumSearch:
         target = tolerance * norms(self.force)
         damping = 0.0 * target
         is_active = size > target
-        for _ in track(range(MAX_ITERATIONS), "equilibrium"):
+        for _ in range(max_iterations):
             if not is_active.any():
                 break
             K = self._assemble_stiffness(C)
@@ -435,12 +459,7 @@ def settle(
         search = EquilibriumSearch(scene, blocks, manager, joints, sliding, n_round > 0)
         is_near = n_round or scene.in_situ is not None
         guess = search.zero if is_near else search.stick_predictor()
-        known_unstable = unstable
-        displacement, new_unstable = search.solve(guess, unstable, known_unstable)
-        unstable = unstable | new_unstable
-        while new_unstable.any():
-            displacement, new_unstable = search.solve(guess, unstable, known_unstable)
-            unstable = unstable | new_unstable
+        displacement, unstable, _ = search.solve(guess, unstable)
         sliding = sliding + (search.kinematics @ displacement)[len(sliding) :]
         blocks.motion[:3] += search.expand(displacement * search.root).T
         is_stable = ~unstable[search.block]
@@ -458,9 +477,9 @@ def equilibrium_displacements(
     """Displacements (m,) of the free motions at which virgin joints carry a scene as drawn.
 
     Scaled by the square root of the inertia; None without an equilibrium. All loads act at
-    once. guess: displacements of a similar scene. The search starts from it, and from the stick
-    predictor: where bonds break and joints soften, one may find an equilibrium that the other
-    misses. unstable (n,): blocks that need no equilibrium.
+    once. guess: displacements of a similar scene from which the search starts, by default the stick
+    predictor. unstable (n,): blocks that need no equilibrium; they move away, so their contacts
+    bear nothing.
     """
     blocks = Blocks(scene)
     joints = Joints(scene)
@@ -468,8 +487,9 @@ def equilibrium_displacements(
     sliding = create_joints(scene, blocks, manager, joints)
     search = EquilibriumSearch(scene, blocks, manager, joints, sliding)
     known_unstable = np.zeros(len(blocks.is_free), bool) if unstable is None else unstable
+    contacts = manager.contacts
+    has_moved_away = known_unstable[contacts.block_a] | known_unstable[contacts.block_b]
+    search.area[np.tile(has_moved_away, 2)] = 0.0
     start = search.stick_predictor() if guess is None else guess
-    displacement, new_unstable = search.solve(start, known_unstable)
-    if new_unstable.any() and guess is not None:
-        displacement, new_unstable = search.solve(search.stick_predictor(), known_unstable)
-    return None if new_unstable.any() else displacement
+    solution = search.solve(start, known_unstable, name_unstable=False)
+    return solution.displacement if solution.verdict is Verdict.EQUILIBRIUM else None

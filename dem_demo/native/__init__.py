@@ -2,5 +2,7 @@
 
 layout         the structures that Python and C share; `layout.h` is made from it
 blocks.c       the step
+relaxation.c   static equilibrium by dynamic relaxation
+export.h       marks the functions that Python calls
 build          makes the library; `python -m dem_demo.native` calls it
 """

@@ -10,18 +10,8 @@
  */
 #include <math.h>
 
+#include "export.h"
 #include "layout.h"
-
-#ifdef __cplusplus
-#define IN_C extern "C"
-#else
-#define IN_C
-#endif
-#ifdef _WIN32
-#define EXPORT IN_C __declspec(dllexport)
-#else
-#define EXPORT IN_C __attribute__((visibility("default")))
-#endif
 
 #define FACE_SINE 0.03489949670250097   /* of 2 degrees: up to this tilt an edge lies on another */
 #define CORNER_SINE 0.08715574274765817 /* of 5 degrees: from this tilt on only its corner touches */

@@ -8,13 +8,14 @@ from jointlaw.native import build as law_build
 from . import layout
 
 HERE = Path(__file__).parent
+SOURCES = tuple(HERE / name for name in ("blocks.c", "relaxation.c"))
 BUILT = HERE / "built"  # the library, and layout.h
 
 
 def hash_sources() -> str:
     """Hash of the sources of the library, by which a stale library is recognised."""
     digest = hashlib.sha256(layout.layout_h().encode())
-    for path in (HERE / "blocks.c", HERE / "build.py"):
+    for path in (*SOURCES, HERE / "export.h", HERE / "build.py"):
         digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
     return digest.hexdigest()[:16]
 
@@ -33,6 +34,6 @@ def build(compiler: law_build.Compiler, folder: Path = BUILT) -> Path:
     (folder / "layout.h").write_text(layout.layout_h(), encoding="utf-8")
     # the narrowest vectors: one library for every processor of this kind
     identity = f'-DDEM_SOURCES="{hash_sources()}"'
-    unit = law_build.Unit(HERE / "blocks.c", min(law_build.LEVELS), (identity,))
+    units = [law_build.Unit(path, min(law_build.LEVELS), (identity,)) for path in SOURCES]
     library = folder / library_name(compiler.machine[1])
-    return law_build.build_library(compiler, [unit], library)
+    return law_build.build_library(compiler, units, library)

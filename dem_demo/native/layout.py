@@ -1,4 +1,4 @@
-"""The structures that Python and `blocks.c` share, declared once.
+"""The structures that Python and the C files share, declared once.
 
 `layout_h` writes them in C, and `dem_demo/compiled.py` makes the same structures for ctypes. Every
 field takes eight bytes, so that no compiler pads between them. By the standard library alone: the
@@ -133,7 +133,48 @@ STEP = {
     "rebuild": Field("long long", "1 if contacts must be searched again"),
     "stiffened": Field("long long", "joints stiffer than `checked_stiffness`"),
 }
-STRUCTURES = {"dem_law_joints": LAW_JOINTS, "dem_step": STEP}
+RELAXED_LAW = {
+    "advance": Field("dem_advance *", "takes a step of the law, whose states stay as they are"),
+    "batch": Field("void *", "its argument: a batch of virgin joints"),
+    "next_joint": Field("long long *", "a field of the batch that must be 0 before a step"),
+    "contact": Field("const long long *", "(n_joints,): contact point of each joint"),
+    "n_joints": Field("long long", "joints of the law"),
+    "d": Field("double *", "(n_joints, dim): displacements, m"),
+    "F": Field("double *", "(n_joints, dim): tractions, Pa"),
+}
+RELAXATION = {
+    "n_blocks": Field("long long", "n"),
+    "n_laws": Field("long long", ""),
+    "dim": Field("long long", "components of a displacement of the law: 2 or 3"),
+    "dof": Field("long long", "motions of a block: 3 or 6"),
+    "laws": Field("const dem_relaxed_law *", "(n_laws,)"),
+    "block_a": Field("const long long *", "(k,): blocks that meet at a contact point"),
+    "block_b": Field("const long long *", "(k,)"),
+    "kinematics": Field("const double *", "(k, dim, 2 dof): J"),
+    "area": Field("const double *", "(k,): m2"),
+    "start": Field("const double *", "(k, dim): closure and shears at y = 0, m"),
+    "reduction": Field("const double *", "(dim,): 1 for closure, the reduction factor for shears"),
+    "load": Field("const double *", "(n, dof): forces that do not change"),
+    "is_free": Field("const double *", "(n, dof): 1, or 0 for motions that are fixed"),
+    "mass": Field("const double *", "(n, dof): more than a quarter of the row sums of stiffness"),
+    "first_force": Field("const double *", "(n, dof): unbalanced force before the ramp"),
+    "y": Field("double *", "(n, dof): displacements"),
+    "v": Field("double *", "(n, dof): their change in an iteration"),
+    "force": Field("double *", "(n, dof): unbalanced force"),
+    "previous_y": Field("double *", "(n, dof): when the damping was last adapted"),
+    "previous_force": Field("double *", "(n, dof): when the damping was last adapted"),
+    "damping": Field("double", "c"),
+    "smallest_force": Field("double", "norm of the unbalanced force, smallest of a call"),
+    "largest_force": Field("double", "norm above which the iterations have diverged"),
+    "done": Field("long long", "iterations"),
+    "ramp": Field("long long", "iterations over which the loads come on"),
+}
+STRUCTURES = {
+    "dem_law_joints": LAW_JOINTS,
+    "dem_step": STEP,
+    "dem_relaxed_law": RELAXED_LAW,
+    "dem_relaxation": RELAXATION,
+}
 
 
 def _enumeration(names: tuple[str, ...], count: str) -> str:
@@ -153,6 +194,7 @@ def layout_h() -> str:
         _enumeration(MEASURES, "MEASURES"),
         _enumeration(ENERGIES, "ENERGIES"),
         "typedef struct { double x, y; } dem_vector;",
+        "typedef int dem_advance(void *batch, int operation);",
     ]
     for name, fields in STRUCTURES.items():
         lines += [

@@ -57,13 +57,17 @@ class ForceBalance(NamedTuple):
 
 
 def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBalance:
-    """The balance of a scene as drawn, without the equations of `excluded` blocks (blocks,)."""
+    """The balance of a scene as drawn, without the `excluded` blocks (blocks,) and their contacts:
+    they move away."""
     blocks = Blocks(scene)
     manager = ContactManager(scene, blocks.motion)
     manager.rebuild(blocks.motion, blocks.neighbour_pairs())
     apply_loads(scene, blocks, manager)
     contacts: Contacts = manager.contacts
-    bearing = np.flatnonzero(contacts.length > 1e-9 * contacts.length.max(initial=0.0))
+    bears = contacts.length > 1e-9 * contacts.length.max(initial=0.0)
+    if excluded is not None:
+        bears &= ~(excluded[contacts.block_a] | excluded[contacts.block_b])
+    bearing = np.flatnonzero(bears)
     count = len(contacts.length)
     motions = opening_and_sliding_rates(blocks, contacts).T.tocsr()  # (free motions, 2 contacts)
     load = ((blocks.gravity + blocks.loads) * blocks.inverse_sqrt_inertia)[blocks.is_free]

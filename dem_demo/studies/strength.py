@@ -25,12 +25,15 @@ from ..output.pictures import Pictures
 from ..output.record import named, told
 from ..output.run import to_failure
 from ..scene import Scene, Tables, build, median_size, read_tables, rotation
+from .limit_analysis import limit_factor
 
 FILE, VERSION = "trials.json", 2
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
 FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
 TWICE = 2.0  # where all blocks are loose: times the strength, with which fewer are
 FIRST = 0.01  # of the usual size of a block: who has moved by half of the most then moves first
+BELOW_BOUND = 0.06  # first step of a search below a bound, of the logarithm
+STEP_GROWTH = 1.5  # of its further steps
 SHOWN = 1.02  # times the factor: what the strength of the failing run is divided by
 
 
@@ -143,17 +146,28 @@ def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray)
 def factor_of_safety(
     scene: Scene, trials: Trials | None = None, name: str = "scene", loose: np.ndarray | None = None
 ) -> float | None:
-    """What the strength of all joints is divided by for a scene to just hold.
+    """Factor by which the strength of all joints is divided at limit equilibrium, to 0.6 %.
 
-    loose (n,): blocks that need not hold.
+    loose (n,): blocks that need not be in equilibrium.
 
-    Strength is the shear stress that a joint can bear at its own normal stress. None if the scene
-    holds with 1/64 of it, or fails with 64 times of it.
+    Strength is the shear stress that a joint can bear at its own normal stress. Limit analysis
+    bounds the factor from above, so the search begins just below its bound. None if the scene is in
+    equilibrium with 1/64 of its strength, or has no equilibrium with 64 times of it.
     """
-    log = _march(
-        lambda log: weakened(scene, float(np.exp(log))), FACTOR, trials or Trials(scene),
-        f"{name}: factor of safety", loose,
-    )  # fmt: skip
+    trials = trials or Trials(scene)
+    limit = trials.ask(f"{name}: limit analysis", partial(limit_factor, scene, loose))
+    name = f"{name}: factor of safety"
+
+    def at(log: float) -> Scene:
+        return weakened(scene, float(np.exp(log)))
+
+    if limit == 0.0:
+        return None
+    log = (
+        _march(at, FACTOR, trials, name, loose)
+        if limit is None
+        else _search_below(at, float(np.log(limit)), FACTOR, trials, name, loose)
+    )
     return None if log is None else float(np.exp(log))
 
 
@@ -194,23 +208,15 @@ def _march(
     where none is found the step is halved.
     """
     step, most, exact = reach
-    with tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False) as bar:
-
-        def found(x: float, last: float | None, guess: np.ndarray | None) -> np.ndarray | None:
-            moved = trials.ask(
-                f"{name} {x} from {last}", lambda: equilibrium_displacements(at(x), guess, loose)
-            )
-            bar.update()
-            return None if moved is None else np.array(moved)
-
+    with _Trial(at, trials, name, loose) as find:
         low, failed = 0.0, False
-        while (moved := found(low, None, None)) is None:
+        while (moved := find(low)) is None:
             if low == -most:
                 return None
             low, failed = max(low - step, -most), True
         while not failed or step > exact:
             high = min(low + step, most)
-            further = found(high, low, moved)
+            further = find(high, low, moved)
             if further is None:
                 failed, step = True, 0.5 * step
             elif high == most:
@@ -218,6 +224,56 @@ def _march(
             else:
                 low, moved = high, further
     return low + step
+
+
+def _search_below(
+    at: Callable[[float], Scene], bound: float, reach: tuple[float, float, float], trials: Trials,
+    name: str, loose: np.ndarray | None = None,
+) -> float | None:  # fmt: skip
+    """Where the scenes `at` lose their equilibrium, known to be below a bound; None below -most."""
+    _, most, exact = reach
+    high, step = bound, BELOW_BOUND
+    low = bound - step
+    with _Trial(at, trials, name, loose) as find:
+        while (moved := find(low)) is None:
+            if low <= -most:
+                return None
+            high, step = low, STEP_GROWTH * step
+            low -= step
+        while high - low > exact:
+            middle = 0.5 * (low + high)
+            further = find(middle, low, moved)
+            if further is None:
+                high = middle
+            else:
+                low, moved = middle, further
+    return 0.5 * (low + high)
+
+
+class _Trial:
+    """Finds the displacements of a trial, from those of another one, and shows progress."""
+
+    def __init__(
+        self, at: Callable[[float], Scene], trials: Trials, name: str, loose: np.ndarray | None
+    ) -> None:
+        self.at, self.trials, self.name, self.loose = at, trials, name, loose
+        self.bar = tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False)
+
+    def __enter__(self) -> "_Trial":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.bar.close()
+
+    def __call__(
+        self, x: float, last: float | None = None, guess: np.ndarray | None = None
+    ) -> np.ndarray | None:
+        moved = self.trials.ask(
+            f"{self.name} {x} from {last}",
+            lambda: equilibrium_displacements(self.at(x), guess, self.loose),
+        )
+        self.bar.update()
+        return None if moved is None else np.array(moved)
 
 
 def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:

@@ -1,0 +1,263 @@
+"""Static equilibrium by dynamic relaxation.
+
+The blocks move through a fictitious time with masses that make every iteration stable, and with a
+damping near the critical one of the slowest motion, until they are at rest. Joints have no history:
+in every iteration the law takes the total displacement in one step from its virgin state. A path of
+iterations would leave joints sheared by displacements several times the static ones, and a slope
+then falls at 0.97 of its strength.
+
+Where Newton's method stops at a maximum of the unbalanced force, relaxation goes on, because it
+follows the forces. Where there is no equilibrium, the unbalanced force no longer falls while
+displacements grow at a steady rate: both together are the verdict "no equilibrium". A stall of the
+unbalanced force alone is none: blocks that rearrange stall for thousands of iterations. What is
+decided neither way within the limit of iterations is reported as such.
+"""
+
+import ctypes
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jointlaw.kernels.engine import Step
+from jointlaw.native import library as law_library
+
+from ..compiled import RelaxationArrays, RelaxedLaw, address
+from ..scene import Law
+
+MASS_FACTOR = 0.28  # masses over row sums of the stiffness: 0.25 is the limit of stability
+CLOSURE_GROWTH = 1.6  # closures on the way over the first ones, which bound the stiffness
+OPEN_JOINT_STIFFNESS = 0.3  # of joints that are open at first, over the median of closed ones
+SMALLEST_MASS = 0.01  # over the median mass
+RAMP = 1000  # iterations over which loads come on
+WINDOW = 500  # iterations between two looks
+MAX_ITERATIONS = 200_000
+PATIENCE = 4  # windows that are compared with as many before
+STALLED = 0.93  # fall of the smallest unbalanced force above which it no longer falls
+STEADY = 0.8  # growth of displacements over that of before above which it is steady
+GROWING = 0.01  # of the largest displacement: growth that counts
+DIVERGED = 10.0  # unbalanced force over the smallest so far at which masses are raised
+HEAVIER = 4.0
+FIRST_NEWTON = 0.03  # unbalanced force (over the loads) at which Newton's method first tries
+AT_REST = 1e-12  # unbalanced force (over the loads) that is rounding
+NEXT_NEWTON = 0.4  # of the unbalanced force of the last trial
+NEWTON_REACH = 0.5  # of the largest displacement: how far Newton's method may go
+MOVES = 0.01  # of the fastest block: slower ones are not unstable
+
+
+INPUT_ARRAYS = (
+    "laws", "block_a", "block_b", "kinematics", "area", "start", "reduction", "load", "is_free",
+)  # fmt: skip
+WORK_ARRAYS = (
+    "mass", "first_force", "y", "v", "force", "previous_y", "previous_force",
+)  # fmt: skip
+
+
+class Verdict(Enum):
+    """Whether an equilibrium was found."""
+
+    EQUILIBRIUM = "in equilibrium"
+    NO_EQUILIBRIUM = "without equilibrium"
+    NOT_DECIDED = "not decided"
+
+
+class Relaxed(NamedTuple):
+    """Result of a relaxation: displacements y (motions,), the growth of each motion (motions,) in
+    the last windows, the verdict, iterations, and unbalanced force over the loads."""
+
+    y: np.ndarray
+    growth: np.ndarray
+    verdict: Verdict
+    iterations: int
+    residual: float
+
+
+class Relaxation:
+    """Blocks on virgin joints, ready to relax.
+
+    laws: of the joints; law (k,): number of the law of each contact point. block_a, block_b (k,):
+    blocks that meet there. kinematics (k, dim, 2 dof): how closure and shears follow the motions of
+    both. area (k,) in m2. start (k, dim) in m: displacements at y = 0. load (n, dof): forces on the
+    blocks. is_free (n, dof). Motions may have any units if forces are the ones that do work on
+    them. reduction: factor of a strength reduction. stiffness_at: upper bound (k,) in Pa/m of the
+    stiffness at closures (k,) in m; stiffness_closed (k,): the same where nothing touches at first.
+    """
+
+    def __init__(
+        self,
+        laws: Sequence[Law],
+        law: np.ndarray,
+        block_a: np.ndarray,
+        block_b: np.ndarray,
+        kinematics: np.ndarray,
+        area: np.ndarray,
+        start: np.ndarray,
+        load: np.ndarray,
+        is_free: np.ndarray,
+        stiffness_at: Callable[[np.ndarray], np.ndarray],
+        stiffness_closed: np.ndarray,
+        reduction: float = 1.0,
+    ) -> None:
+        dim, both = kinematics.shape[1:]
+        shape = (len(load), both // 2)
+        self.stiffness_at = stiffness_at
+        self.stiffness_closed = stiffness_closed
+        self.block_a = np.ascontiguousarray(block_a, np.int64)
+        self.block_b = np.ascontiguousarray(block_b, np.int64)
+        self.kinematics = np.ascontiguousarray(kinematics, float)
+        self.area = np.ascontiguousarray(area, float)
+        self.start = np.ascontiguousarray(start, float)
+        self.reduction = np.append(1.0, np.full(dim - 1, reduction))
+        self.load = np.ascontiguousarray(load * is_free, float)
+        self.is_free = np.array(is_free, float, order="C")
+        for name in WORK_ARRAYS:
+            setattr(self, name, np.zeros(shape))
+        self.steps = [self._law_step(one, np.flatnonzero(law == i)) for i, one in enumerate(laws)]
+        self.laws = (RelaxedLaw * len(laws))(*(self._law_arrays(*step) for step in self.steps))
+        self.arrays = RelaxationArrays(
+            n_blocks=len(load), n_laws=len(laws), dim=dim, dof=shape[1], ramp=RAMP
+        )
+        self.arrays.bind(self, *INPUT_ARRAYS, *WORK_ARRAYS)
+        self.scale = float(np.linalg.norm(self.load)) or 1.0
+
+    def _law_step(self, law: Law, contact: np.ndarray) -> tuple[Any, Step, np.ndarray]:
+        """A batch of virgin joints for these contact points (m,), and a step that leaves it so."""
+        m, dim = len(contact), self.start.shape[1]
+        batch = law.joints(m, ledger=False)
+        step = Step(np.zeros((m, dim)), np.zeros((m, dim)), None, keep=False)
+        if m:
+            batch.take(step)  # prepares the call of the library
+        return batch, step, contact
+
+    def _law_arrays(self, batch: Any, step: Step, contact: np.ndarray) -> RelaxedLaw:
+        """Addresses of a step for the compiled relaxation."""
+        call = step.call[1]
+        if call is None:
+            return RelaxedLaw()
+        call.commit = call.track_dissipation = False
+        call.chunk = len(contact)
+        where = ctypes.addressof(call)
+        return RelaxedLaw(
+            advance=ctypes.cast(law_library.load().jlaw_run, ctypes.c_void_p).value,
+            batch=where,
+            next_joint=where + type(call).next.offset,
+            contact=contact.ctypes.data,
+            n_joints=len(contact),
+            d=address(step.d),
+            F=address(step.F),
+        )
+
+    def unbalanced(self, y: np.ndarray) -> np.ndarray:
+        """Unbalanced forces (n, dof) of the free motions at displacements y (n, dof)."""
+        self.y[:] = y
+        self._call("compute_unbalanced")
+        return self.force * self.is_free
+
+    def _call(self, name: str, *arguments: int) -> bool:
+        """Call a compiled function; returns whether the iterations diverged."""
+        status = self.arrays.call(name, *arguments)
+        if status < 0:
+            raise MemoryError("no memory for a copy of a block of states")
+        return bool(status)
+
+    def masses(self, y: np.ndarray) -> np.ndarray:
+        """Masses (n, dof) with which iterations are stable while joints close by no more than 1.6
+        times their closure at y (n, dof)."""
+        a, b, dof = self.block_a, self.block_b, y.shape[1]
+        moved = np.concatenate([y[a], y[b]], axis=1)
+        closure = self.start[:, 0] + np.einsum("km,km->k", self.kinematics[:, 0], moved)
+        is_closed = closure > 0
+        if is_closed.any():
+            stiffness = self.stiffness_at(CLOSURE_GROWTH * closure)
+            typical = np.median(stiffness[is_closed])
+            stiffness = np.maximum(stiffness, OPEN_JOINT_STIFFNESS * typical)
+        else:
+            stiffness = self.stiffness_closed
+        size = np.abs(self.kinematics)
+        row_sum = size.sum(axis=2)  # (k, dim): over the motions of both blocks
+        mass = np.zeros_like(y)
+        for block, part in ((a, size[:, :, :dof]), (b, size[:, :, dof:])):
+            np.add.at(mass, block, np.einsum("k,kc,kcm->km", stiffness * self.area, row_sum, part))
+        is_heavy = (self.is_free > 0) & (mass > 0)
+        if is_heavy.any():
+            mass = np.maximum(mass, SMALLEST_MASS * np.median(mass[is_heavy]))
+        return MASS_FACTOR * np.where(mass > 0, mass, 1.0)
+
+    def fix(self, blocks: np.ndarray) -> None:
+        """Let blocks (mask or indices) stay where they are."""
+        self.is_free[blocks] = 0.0
+        self.load *= self.is_free
+
+    def relax(self, y: np.ndarray, finish: Callable[[np.ndarray], np.ndarray | None]) -> Relaxed:
+        """Relax from y (n, dof).
+
+        finish: Newton's method; returns the equilibrium that it finds near displacements, or None.
+        """
+        none = np.zeros_like(y)
+        self.first_force[:] = self.unbalanced(y)
+        first_size = float(np.linalg.norm(self.first_force)) / self.scale
+        if first_size < FIRST_NEWTON and (found := finish(y)) is not None:
+            return Relaxed(found, none, Verdict.EQUILIBRIUM, 0, first_size)
+        self.mass[:] = self.masses(y)
+        self.arrays.done = 0
+        self.arrays.largest_force = DIVERGED * self.scale * max(1.0, first_size)
+        self._restart(y)
+        best, smallest, newton_at = y.copy(), np.inf, FIRST_NEWTON
+        sizes: list[float] = []
+        places: list[np.ndarray] = []
+        while self.arrays.done < MAX_ITERATIONS:
+            if self._call("relax", WINDOW):
+                self.mass *= HEAVIER
+                self._restart(best)
+                sizes.clear()
+                places.clear()
+                continue
+            now = self.y.copy()
+            self.mass[:] = np.maximum(self.mass, self.masses(now))
+            if self.arrays.done <= RAMP:
+                continue
+            size = self.arrays.smallest_force / self.scale
+            if size < smallest:
+                best, smallest = now, size
+            if size < newton_at:
+                found = finish(now)
+                if found is not None and self._is_near(found, now):
+                    return Relaxed(found, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
+                newton_at = NEXT_NEWTON * size
+            if size < AT_REST:
+                return Relaxed(now, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
+            sizes.append(size)
+            places.append(now)
+            growth = _steady_growth(sizes, places)
+            if growth is not None:
+                return Relaxed(now, growth, Verdict.NO_EQUILIBRIUM, self.arrays.done, size)
+        growth = places[-1] - places[max(-1 - PATIENCE, -len(places))] if places else none
+        return Relaxed(self.y.copy(), growth, Verdict.NOT_DECIDED, self.arrays.done, smallest)
+
+    def _is_near(self, found: np.ndarray, y: np.ndarray) -> bool:
+        """Whether Newton's method ended near the displacements that it started from."""
+        reach = NEWTON_REACH * np.abs(y * self.is_free).max(initial=0.0)
+        return bool(np.abs((found - y) * self.is_free).max(initial=0.0) <= reach)
+
+    def _restart(self, y: np.ndarray) -> None:
+        """Begin at rest at displacements y (n, dof), with the loads of the present iteration."""
+        self.v[:] = 0.0
+        fading = max(0.0, 1.0 - self.arrays.done / RAMP)
+        self.force[:] = self.unbalanced(y) - fading * self.first_force * self.is_free
+        self.previous_force[:] = self.force
+        self.previous_y[:] = y
+        self.arrays.damping = 0.0
+
+
+def _steady_growth(sizes: list[float], places: list[np.ndarray]) -> np.ndarray | None:
+    """Growth of displacements in the last windows where it is steady while the unbalanced force no
+    longer falls; else None."""
+    if len(sizes) <= 2 * PATIENCE:
+        return None
+    growth = places[-1] - places[-1 - PATIENCE]
+    before = places[-1 - PATIENCE] - places[-1 - 2 * PATIENCE]
+    fastest = np.abs(growth).max()
+    stalls = min(sizes[-PATIENCE:]) > STALLED * min(sizes[-2 * PATIENCE : -PATIENCE])
+    grows = fastest > GROWING * np.abs(places[-1]).max()
+    return growth if stalls and grows and fastest > STEADY * np.abs(before).max() else None

@@ -20,11 +20,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import jointlaw as jl
 from jointlaw.kernels.engine import Step
-from jointlaw.native import library as law_library
+from jointlaw.native.library import load as load_law_library
 
 from ..compiled import RelaxationArrays, RelaxedLaw, address
-from ..scene import Law
 
 MASS_FACTOR = 0.28  # masses over row sums of the stiffness: 0.25 is the limit of stability
 CLOSURE_GROWTH = 1.6  # closures on the way over the first ones, which bound the stiffness
@@ -86,7 +86,7 @@ class Relaxation:
 
     def __init__(
         self,
-        laws: Sequence[Law],
+        laws: Sequence[jl.Law],
         law: np.ndarray,
         block_a: np.ndarray,
         block_b: np.ndarray,
@@ -121,7 +121,7 @@ class Relaxation:
         self.arrays.bind(self, *INPUT_ARRAYS, *WORK_ARRAYS)
         self.scale = float(np.linalg.norm(self.load)) or 1.0
 
-    def _law_step(self, law: Law, contact: np.ndarray) -> tuple[Any, Step, np.ndarray]:
+    def _law_step(self, law: jl.Law, contact: np.ndarray) -> tuple[Any, Step, np.ndarray]:
         """A batch of virgin joints for these contact points (m,), and a step that leaves it so."""
         m, dim = len(contact), self.start.shape[1]
         batch = law.joints(m, ledger=False)
@@ -139,7 +139,7 @@ class Relaxation:
         call.chunk = len(contact)
         where = ctypes.addressof(call)
         return RelaxedLaw(
-            advance=ctypes.cast(law_library.load().jlaw_run, ctypes.c_void_p).value,
+            advance=ctypes.cast(load_law_library().jlaw_run, ctypes.c_void_p).value,
             batch=where,
             next_joint=where + type(call).next.offset,
             contact=contact.ctypes.data,

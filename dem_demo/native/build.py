@@ -3,7 +3,8 @@
 import hashlib
 from pathlib import Path
 
-from jointlaw.native import build as law_build
+from jointlaw.native.build import LEVELS, Compiler, Unit, build_library
+from jointlaw.native.build import library_name as law_library_name
 
 from . import layout
 
@@ -22,10 +23,10 @@ def hash_sources() -> str:
 
 def library_name(system: str) -> str:
     """File name of the library on an operating system."""
-    return law_build.library_name(system, "libdem_demo")
+    return law_library_name(system, "libdem_demo")
 
 
-def build(compiler: law_build.Compiler, folder: Path = BUILT) -> Path:
+def build(compiler: Compiler, folder: Path = BUILT) -> Path:
     """Build the library in the folder and return its path.
 
     Raises RuntimeError with the messages of the compiler if it fails.
@@ -34,6 +35,6 @@ def build(compiler: law_build.Compiler, folder: Path = BUILT) -> Path:
     (folder / "layout.h").write_text(layout.layout_h(), encoding="utf-8")
     # the narrowest vectors: one library for every processor of this kind
     identity = f'-DDEM_SOURCES="{hash_sources()}"'
-    units = [law_build.Unit(path, min(law_build.LEVELS), (identity,)) for path in SOURCES]
+    units = [Unit(path, min(LEVELS), (identity,)) for path in SOURCES]
     library = folder / library_name(compiler.machine[1])
-    return law_build.build_library(compiler, units, library)
+    return build_library(compiler, units, library)

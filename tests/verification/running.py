@@ -1,18 +1,18 @@
-"""Steps of blocks."""
+"""Advance simulations of blocks."""
 
 
-def steps(sim, count, see=lambda: None):
-    """Take so many steps; what `see` gives after each."""
-    seen = []
+def steps(sim, count, observe=lambda: None):
+    """Take `count` steps; list of the results of `observe` after each."""
+    observed = []
     for _ in range(count):
         sim.step()
-        seen.append(see())
-    return seen
+        observed.append(observe())
+    return observed
 
 
-def until(sim, time, see=lambda: None):
-    """Step on to a time (s); what `see` gives after each step."""
-    seen = []
+def until(sim, time, observe=lambda: None):
+    """Step to a time (s); list of the results of `observe` after each step."""
+    observed = []
     while sim.time < time:
-        seen += steps(sim, 1, see)
-    return seen
+        observed += steps(sim, 1, observe)
+    return observed

@@ -1,6 +1,6 @@
-"""What steps of blocks do: all forces against plain numpy, which knows no frame; that rounding of
-the drawing does not matter; and the critical time step, which is sharp: bounded at 0.95 of it,
-diverging at 1.05."""
+"""Steps of blocks: geometry, forces and energies against plain numpy; independence of the rounding
+of coordinates; the critical time step, bounded at 0.95 of the limit and divergent at 1.05.
+"""
 
 import contextlib
 import ctypes
@@ -24,8 +24,8 @@ from dem_demo.scene import Files, build_law
 PLAIN = coulomb(0.5, 1e9, 1e9)
 
 
-def test_critical_damping_is_that_of_the_block_on_all_its_joints():
-    """2 sqrt(K m), shared by the two ends of the face."""
+def test_critical_damping_of_all_joints_of_a_block_adds_up():
+    """2 sqrt(K m), half of it at either end of the face."""
     sim = Simulation(parse(on_base(PLAIN, [1.0, 0.5])))
     stiffness = np.full(sim.joints.n, 1e8)
     critical = 2 * np.sqrt(stiffness.sum() * sim.blocks.inertia[1, 0])
@@ -33,10 +33,10 @@ def test_critical_damping_is_that_of_the_block_on_all_its_joints():
     assert sim.blocks.critical_damping(sim.contacts, stiffness).sum() == pytest.approx(critical)
 
 
-# a block that falls on its corner, at tilts at which its lower edge is raised in part
+# a block that falls on its corner, at tilts of its lower edge between lying and raised
 ROCKING = on_base(coulomb(0.5, 1e9, 8e8), [1.0, 0.5], at=[0.0, 0.279], angle=3.5)
 ROCKING += "settle = false\nstep = 1e-4\n"
-# a block that flies up from its seat: dashpots never pull
+# a block that flies up from its base: dashpots never pull
 FLYING = on_base(PLAIN, [1.0, 0.5], velocity=[0.0, 0.05]) + "step = 1e-4\ndashpot_normal = 0.3\n"
 GEOMETRY = (
     "position",
@@ -59,35 +59,39 @@ GEOMETRY = (
      ("shear-box", (300, 300)), pytest.param(ROCKING, (5, 200, 200), id="rocking"),
      pytest.param(FLYING, (1, 1), id="flying")],
 )  # fmt: skip
-def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
-    """Geometry, forces with their torques, energies and velocities of steps on the way of a scene.
+def test_a_compiled_step_agrees_with_plain_numpy(name, steps):
+    """Geometry, forces and torques, energies and velocities of some steps of a scene.
 
-    Places of 20 m are known to 4e-15 m; what is divided by a length of 1 mm or so loses three
-    digits. Forces on the scale of those of the contacts: at rest their sum is almost nothing.
+    Tolerances: coordinates of 20 m have a rounding of 4e-15 m, and quotients by lengths of 1 mm
+    lose three digits. Errors of forces are relative to the contact forces, as their sum vanishes at
+    rest.
     """
     sim = Simulation(parse(name) if "[run]" in name else load(name))
-    for steps_on in steps:
-        for _ in range(steps_on):
+    for n_steps in steps:
+        for _ in range(n_steps):
             before = sim.energy_balance.value
             sim.step()
-        c, drives, dt = sim.contacts, sim.blocks.drives, sim.dt
+        c = sim.contacts
+        dt = sim.dt
         plain = PlainContacts(sim.manager.outlines, c.corner, c.edge, sim.blocks.motion)
         for part in GEOMETRY:
-            ours, theirs = getattr(c, part), getattr(plain, part)
-            size = max(float(np.abs(theirs).max(initial=0.0)), 1e-3)
-            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-11 * size, err_msg=part)
+            expected = getattr(plain, part)
+            size = max(float(np.abs(expected).max(initial=0.0)), 1e-3)
+            compiled = getattr(c, part)
+            np.testing.assert_allclose(compiled, expected, rtol=0, atol=1e-11 * size, err_msg=part)
         assert (c.corner_takes_over == plain.corner_takes_over).all()
-        force, booked, velocity = plain_step(sim, drives.aim, dt)
+        force, energies, velocity = plain_step(sim, sim.blocks.drives.aim, dt)
         scale = np.abs(c.length[:, None] * sim.joints.traction).max(initial=0.0)
         scale = max(scale, float(np.abs(sim.blocks.gravity).max()))
         np.testing.assert_allclose(sim.energy_balance.forces, force, rtol=0, atol=1e-12 * scale)
         tiny = 1e-12 * scale * dt / sim.blocks.inertia.min()
         np.testing.assert_allclose(sim.blocks.velocity, velocity, rtol=0, atol=tiny)
         for entry, now in sim.energy_balance.value.items():
-            if entry in booked:
-                gained = now - before[entry] * (entry not in ("kinetic", "stored"))
+            if entry in energies:
+                is_sum = entry not in ("kinetic", "stored")
+                change = now - before[entry] * is_sum
                 turned = max(sim.energy_balance.value["turned"], 1e-9)
-                assert gained == pytest.approx(booked[entry], abs=1e-13 * turned), entry
+                assert change == pytest.approx(energies[entry], abs=1e-13 * turned), entry
 
 
 def test_python_and_c_have_the_same_structures():
@@ -102,37 +106,39 @@ def test_python_and_c_have_the_same_structures():
         assert all(re.search(rf"(->|\.){name}\b", source) for name in fields)
 
 
-def test_rounding_of_the_drawing_does_not_choose_between_equal_corners():
-    """Corners of the scene slope moved by a last digit or two: where joints cross, corners of four
-    blocks meet, and which is over which edge is a tie. Coordinates of 20 m are known to 4e-15 m."""
-    scene, rng = load("slope"), np.random.default_rng(1)
+def test_rounding_of_coordinates_does_not_choose_between_equal_corners():
+    """Corners of the scene slope changed by one or two last digits. Where joints cross, corners of
+    four blocks meet, and which one belongs to which edge is a tie. Coordinates of 20 m have a
+    rounding of 4e-15 m."""
+    scene = load("slope")
+    rng = np.random.default_rng(1)
 
     def start(digits):
-        def moved(corners):
+        def perturb(corners):
             return corners * (1 + 2e-16 * rng.integers(-digits, digits + 1, corners.shape))
 
-        blocks = tuple(replace(block, corners=moved(block.corners)) for block in scene.blocks)
+        blocks = tuple(replace(block, corners=perturb(block.corners)) for block in scene.blocks)
         sim = Simulation(replace(scene, blocks=blocks))
         return sim.blocks.motion[:3], list(zip(sim.contacts.corner, sim.contacts.edge, strict=True))
 
-    place, contacts = start(0)
-    other, also = start(2)
-    assert also == contacts
-    assert other == pytest.approx(place, abs=1e-12)
+    position, contacts = start(0)
+    perturbed_position, perturbed_contacts = start(2)
+    assert perturbed_contacts == contacts
+    assert perturbed_position == pytest.approx(position, abs=1e-12)
 
 
-def ring(scene, share, steps):
-    """Largest velocity after small pushes, per step, at a share of the predicted limit."""
+def vibrate(scene, fraction, steps):
+    """Largest velocity per step after small random pushes, at a fraction of the predicted limit."""
     sim = Simulation(scene, step=1e-9)
-    sim.limit.checked_stiffness[:] = np.inf  # it would refuse what is tested here
-    sim.dt = share * sim.limit.current
+    sim.limit.checked_stiffness[:] = np.inf  # no check of the time step that is tested here
+    sim.dt = fraction * sim.limit.current
     rng = np.random.default_rng(3)
     sim.blocks.motion[3:] = (
         1e-7 * rng.standard_normal(sim.blocks.motion[3:].shape) * sim.blocks.is_mobile.T
     )
     sim.blocks.velocity[:] = sim.blocks.motion[3:] * sim.blocks.is_mobile.T
     size = []
-    with contextlib.suppress(SceneError):  # overlap or speed: it has diverged as far as it can
+    with contextlib.suppress(SceneError):  # refused overlap or speed: it has diverged
         for _ in range(steps):
             sim.step()
             size.append(np.abs(sim.blocks.motion[3:]).max())
@@ -142,9 +148,9 @@ def ring(scene, share, steps):
 @pytest.mark.parametrize("zeta", [0.0, 0.1])
 @pytest.mark.parametrize("blocks", [1, 10])
 def test_bounded_below_the_limit_and_not_above(blocks, zeta):
-    """Energy of the leapfrog at 0.95 of the limit lets velocities grow by 1/sqrt(1 - 0.95^2) = 3.2
-    over the pushes, times a few modes that add up. Without dashpots the growth per step is 1.88 at
-    1.05 of the limit: 1e4 within 30 steps."""
+    """At 0.95 of the limit, the energy that the leapfrog scheme conserves lets velocities grow by
+    1/sqrt(1 - 0.95^2) = 3.2, times a few modes in superposition. Without dashpots the growth per
+    step at 1.05 of the limit is 1.88: a factor of 1e4 within 30 steps."""
     # blocks on each other with a linear law that neither slides nor differs by direction
     text = f"[laws.linear]\n{coulomb(np.inf, 1e8, 1e8)}"
     for i in range(blocks):
@@ -152,30 +158,32 @@ def test_bounded_below_the_limit_and_not_above(blocks, zeta):
     text += block("base", box=[2.0, 1.0], at=[0.0, -0.5], fixed=True)
     run = lines(end=1.0, dashpot_normal=zeta, dashpot_shear=zeta)
     column = parse(f"{text}[run]\n{run}")
-    size = ring(column, 0.95, 3000)
+    size = vibrate(column, 0.95, 3000)
     assert len(size) == 3000
     assert size.max() < 10 * size[:50].max()
     if zeta:
-        assert size[-1] < 0.5 * size[0]  # the slowest mode of ten blocks rings longest
-    size = ring(column, 1.05, 300)
+        assert size[-1] < 0.5 * size[0]  # the slowest mode of ten blocks decays last
+    size = vibrate(column, 1.05, 300)
     assert size.max() > 1e4 * size[0]
 
 
-def test_stiffness_at_stress_bounds_a_sheared_joint():
-    """The time step takes stiffness from normal stress: the unsheared joint must be stiffest."""
+def test_first_loading_stiffness_bounds_a_sheared_joint():
+    """The time step follows from it: at equal normal stress the unsheared joint is stiffest."""
     law = build_law(tomllib.loads(ROCK), "law", Files())
-    curve, rng = tabulate_first_loading(law), np.random.default_rng(5)
-    batch, closure = law.joints(40), law.closure(np.geomspace(5e3, 3e5, 40))
+    curve = tabulate_first_loading(law)
+    rng = np.random.default_rng(5)
+    batch = law.joints(40)
+    closure = law.closure(np.geomspace(5e3, 3e5, 40))
     batch.update(np.column_stack([closure, np.zeros(40)]), tangent=False)
-    worst = 0.0
+    largest = 0.0
     for _ in range(150):
         d = np.column_stack([rng.normal(0, 0.02, 40) * closure, rng.normal(2e-5, 1e-4, 40)])
         d[:, 0] = np.maximum(d[:, 0], 0.05 * closure - batch.delta[:, 0])
         F, C = batch.update(d, tangent=True)
         bound = np.interp(F[:, 0], curve["stress"], curve["stiffness"])
-        share = np.linalg.norm(C, ord=2, axis=(1, 2)) / bound
-        worst = max(worst, float(share[F[:, 0] > 1e3].max()))
-    assert 0.3 < worst < 1.0
+        ratio = np.linalg.norm(C, ord=2, axis=(1, 2)) / bound
+        largest = max(largest, float(ratio[F[:, 0] > 1e3].max()))
+    assert 0.3 < largest < 1.0
 
 
 FALL = (
@@ -184,32 +192,32 @@ FALL = (
 )
 
 
-def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
-    """A step for 10 Pa, far too long for the fall of a block by 0.1 m: halved, the books close, and
-    the block falls as it does with a short step, given or chosen. A long one that is given is
-    refused instead."""
+def test_an_automatic_step_is_halved_in_an_impact(monkeypatch):
+    """A step for an impact of 10 Pa is far too long for a block that falls by 0.1 m. It is halved:
+    the energy balance holds, and the block falls as with a short step. A long step that the user
+    sets is refused instead."""
     monkeypatch.setattr(simulation, "IMPACT_STRESS", 10.0)
     fast = Simulation(parse(FALL))
     first = fast.dt
     steps = np.diff(until(fast, 0.4, lambda: fast.time), prepend=0.0)
     assert fast.dt <= 0.5 * first
-    assert steps.max() < first * (1 + 1e-6)  # no time is lost or told twice
+    assert steps.max() < first * (1 + 1e-6)  # time is continuous
     assert steps.min() > 0.999 * fast.dt
     assert abs(fast.energy_balance.error) < 5e-3
     slow = Simulation(parse(FALL), step=0.25 * fast.dt)
     until(slow, fast.time)
     assert fast.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
     monkeypatch.undo()
-    chosen = Simulation(parse(FALL))
-    assert chosen.dt < first
-    until(chosen, fast.time)
-    assert abs(chosen.energy_balance.error) < 1e-2  # a longer step
-    assert chosen.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
-    given = Simulation(parse(FALL), step=first)
+    automatic = Simulation(parse(FALL))
+    assert automatic.dt < first
+    until(automatic, fast.time)
+    assert abs(automatic.energy_balance.error) < 1e-2  # a longer step
+    assert automatic.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
+    long = Simulation(parse(FALL), step=first)
     with pytest.raises(SceneError, match="must stay below"):
-        until(given, 0.4)
+        until(long, 0.4)
 
 
-def test_a_scene_in_which_forces_move_nothing_asks_for_a_step():
+def test_a_scene_in_which_forces_move_no_block_needs_a_step():
     with pytest.raises(SceneError, match=r"set run.step \(s\)"):
         Simulation(parse(FALL.replace("angle = 3.0", 'fixed_motions = ["x", "y", "turn"]')))

@@ -68,7 +68,7 @@ def exact_steps():
 def forgetting():
     """Fraction of the locked-in shear stress that is left after small cycles of closure."""
     test = "test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate"
-    figures = recorded_figures(f"slow_bed.py::{test}")
+    figures = recorded_figures(f"spring_slider.py::{test}")
     rows = []
     for cells, *fractions in figures["forgetting"]:
         rows.append([cells, *(f"{fraction:.4f}" for fraction in fractions)])

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from first_loading import first_loading
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from slow_virgin import virgin
 
 import jointlaw as jl
 
@@ -116,7 +116,7 @@ def test_curve_and_slope(case):
     )
     force, slope = case.curve.force(np.array(Y))
     for y, F, K in zip(Y, force, slope, strict=True):
-        exact, exact_slope = virgin(y, eta, slow, h.breakpoints())
+        exact, exact_slope = first_loading(y, eta, slow, h.breakpoints())
         # S = Phi/y^(1+eta), at most 1, is tabulated to 1e-10 (1e-9 at the edges of a histogram),
         # its derivative is one order lower
         assert F / y ** (1 + eta) == pytest.approx(exact / y ** (1 + eta), abs=1e-9)

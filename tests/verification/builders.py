@@ -1,5 +1,5 @@
-"""Laws and paths that the verification tests share, in units of the closure range; the paper's
-laws, random shapes, and a plain grid over the orientations of Eq. 14 as printed."""
+"""Laws and paths of the verification tests, in units of the closure range; the paper's laws, random
+orientations, and a quadrature over the orientations of Eq. 14 as printed."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,7 +9,7 @@ import numpy as np
 
 import jointlaw as jl
 
-SMOOTH = {"alpha": 3.82, "beta": 1.15, "overlap": 2.0}  # Westerly granite, in um
+SMOOTH_HEIGHTS = {"alpha": 3.82, "beta": 1.15, "overlap": 2.0}  # Westerly granite, in um
 
 
 def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, damage=(), **more):
@@ -17,7 +17,7 @@ def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, da
 
     damage: yield_interference of the asperities, as a mapping.
     """
-    heights = None if formation is None else jl.GammaHeights(**SMOOTH, formation=formation)
+    heights = None if formation is None else jl.GammaHeights(**SMOOTH_HEIGHTS, formation=formation)
     more = {"asperity_density": 1.0, "closure_range": 1.0, "resolution": "fine"} | more
     return jl.JointLaw(
         orientation=jl.Orientation(a, b, c),
@@ -28,7 +28,7 @@ def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, da
 
 
 def random_corners(rng, n, legs=6):
-    """Corners (n, legs, 3): closing first, then anything, apart in the middle, shut again."""
+    """Corners (n, legs, 3): closed first, then at random, open in the middle, closed at the end."""
     corners = rng.uniform(-1.0, 1.0, (n, legs, 3)) * [0.6, 1.0, 1.0] + [0.4, 0.0, 0.0]
     corners[:, 0] *= [0.0, 0.3, 0.3]
     corners[:, 0, 0] = rng.uniform(0.5, 1.0, n)
@@ -46,17 +46,17 @@ def increments(corners, steps):
 
 @cache
 def preset(name):
-    """A preset with 12 x 32 orientations, and 8 depth cells unless asperities are linear."""
-    found = jl.presets.load(name)
-    return replace(found, resolution=jl.Resolution(12, 16, 8 if found.asperity.eta else 1))
+    """A preset with 12 x 32 orientations, and 8 cells a facet unless asperities are linear."""
+    law = jl.presets.load(name)
+    return replace(law, resolution=jl.Resolution(12, 16, 8 if law.asperity.eta else 1))
 
 
 def shapes(count):
-    """Admissible a, b, c drawn at random, always the same ones."""
-    draw = np.random.default_rng(1999)
-    b = draw.uniform(-1.0, 2.0, count)
-    c = draw.uniform(-1.0, 1.0, count) * (1 / 3 - b / 6)
-    return map(jl.Orientation, 1 + draw.exponential(2.0, count), b, c)
+    """Random admissible orientations, the same in every run."""
+    rng = np.random.default_rng(1999)
+    b = rng.uniform(-1.0, 2.0, count)
+    c = rng.uniform(-1.0, 1.0, count) * (1 / 3 - b / 6)
+    return map(jl.Orientation, 1 + rng.exponential(2.0, count), b, c)
 
 
 def directions(a, b, c, start=0.0, order=64, azimuths=32):

@@ -1,7 +1,7 @@
-"""Slopes that fade with the distance from mate, slopes that wear, asperities that yield, in closed
-forms; against the slow bed: test_slow_bed.py. And no step of theirs, nor of elastic asperities,
-creates energy, by the work along the step's own geometry (docs/theory-incremental.md, "No step
-creates energy").
+"""Loss of interlock with slip, asperity degradation, yielding asperities, in closed forms (against
+the spring-slider model: test_spring_slider.py). No step of such a law, or of elastic asperities,
+creates energy by the work along the step's own geometry (docs/theory-incremental.md, "Dissipation
+is non-negative along the geometry of the step").
 """
 
 import warnings
@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import law, random_corners
-from work import begun, step_work, walk
+from work import degraded, states_along, work_on_step_geometry
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
@@ -23,42 +23,44 @@ FINE = jl.Resolution(12, 12, 12)
 @pytest.mark.slow
 @pytest.mark.parametrize("stress", [0.1e6, 1e6, 3e6, 30e6])
 @pytest.mark.parametrize("name", PRESETS)
-def test_friction_is_that_of_the_asperities_and_the_dilation(name, stress):
-    """At and after the peak; springs still fill at it, the more the higher the stress. Sheared back
-    to its origin the joint is mated."""
-    for lengths in (12.0, 100.0):
-        law, rows = jl.presets.load(name), []
-        D = lengths * law.closure_range
+def test_friction_angle_is_the_angle_of_the_asperities_plus_dilation(name, stress):
+    """At and after the peak, where some asperities still stick, the more the higher the stress.
+    Sheared back to its origin the joint is interlocked."""
+    for mating_ratio in (12.0, 100.0):
+        law = jl.presets.load(name)
+        rows = []
+        D = mating_ratio * law.closure_range
         joint = replace(law, mating_length=D, plane=0.0, resolution=FINE).joint()
-        way = D * np.concatenate([np.geomspace(1e-3, 1.0, 60), np.linspace(1.05, 10.0, 60)])
-        for place in (*way, *way[::-1], 0.0):
-            record = jl.direct_shear(joint, [place - joint.delta[1]], normal=stress, steps=1)
+        slips = D * np.concatenate([np.geomspace(1e-3, 1.0, 60), np.linspace(1.05, 10.0, 60)])
+        for slip in (*slips, *slips[::-1], 0.0):
+            record = jl.direct_shear(joint, [slip - joint.delta[1]], normal=stress, steps=1)
             rows.append([record.friction_angle[-1], joint.delta[0]])
         friction, closure = np.array(rows).T
-        lift = closure[0] - closure
-        assert abs(lift[-1]) < (0.04 if stress > 3e6 else 0.01) * lift.max()
-        friction, closure = friction[: len(way)], closure[: len(way)]
-        dilation = np.degrees(np.arctan(-np.gradient(closure, way)))
-        away = np.abs(friction - np.degrees(np.arctan(law.asperity.mu)) - dilation)
-        top = int(np.argmax(friction))
-        assert away[top:-1].max() < (4.2 if stress > 3e6 else 3.3)
+        rise = closure[0] - closure
+        assert abs(rise[-1]) < (0.04 if stress > 3e6 else 0.01) * rise.max()
+        forward = slice(len(slips))
+        friction = friction[forward]
+        dilation = np.degrees(np.arctan(-np.gradient(closure[forward], slips)))
+        difference = np.abs(friction - np.degrees(np.arctan(law.asperity.mu)) - dilation)
+        peak = int(np.argmax(friction))
+        assert difference[peak:-1].max() < (4.2 if stress > 3e6 else 3.3)
         if stress <= 3e6:
-            assert away[way > way[top] + D][:-1].max() < 1.2
+            assert difference[slips > slips[peak] + D][:-1].max() < 1.2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mated", [True, False])
 @pytest.mark.parametrize("stress", [0.1e6, 1e6, 30e6])
 @pytest.mark.parametrize("name", PRESETS)
-def test_far_from_mate_only_the_friction_of_the_asperities_is_left(name, stress, mated):
+def test_far_from_interlock_only_the_friction_of_the_asperities_remains(name, stress, mated):
     law = replace(jl.presets.load(name), resolution="fine")
     law = replace(law, mating_length=12.0 * law.closure_range)
-    way = 100.0 * law.mating_length if mated else 3.0 * law.closure_range
-    for turn in np.arange(8) * np.pi / 4:
+    slip = 100.0 * law.mating_length if mated else 3.0 * law.closure_range
+    for azimuth in np.arange(8) * np.pi / 4:
         joint = law.joint(mated=mated)
-        e = np.array([np.cos(turn), np.sin(turn)])
-        jl.direct_shear(joint, [way], normal=stress, azimuth=turn, steps=40)
-        angle = np.degrees(np.arctan2(joint.F[1:] @ e, joint.F[0]))
+        direction = np.array([np.cos(azimuth), np.sin(azimuth)])
+        jl.direct_shear(joint, [slip], normal=stress, azimuth=azimuth, steps=40)
+        angle = np.degrees(np.arctan2(joint.F[1:] @ direction, joint.F[0]))
         assert angle == pytest.approx(np.degrees(np.arctan(law.asperity.mu)), abs=0.3)
 
 
@@ -66,30 +68,35 @@ def test_far_from_mate_only_the_friction_of_the_asperities_is_left(name, stress,
 @pytest.mark.parametrize(
     ("formation", "eta"), [(None, 0.0), ("population", 0.5), ("individual", 1)]
 )
-def test_closure_has_a_closed_form(formation, eta, interference):
+def test_closure_of_yielding_asperities_has_a_closed_form(formation, eta, interference):
     one = law(formation=formation, eta=eta, mu=0.0, resolution=jl.Resolution(2, 4, 3),
               damage={"yield_interference": interference})  # fmt: skip
-    joint, k = one.joint(), one.tables.asperities
+    joint = one.joint()
+    k = one.tables.asperities
 
     def phi(y):
         return k.curve.force(np.asarray(y, float))[0]
 
-    deep, last, highest = interference / k.c1, 0.0, 0.0
+    yield_closure = interference / k.c1
+    closure = 0.0
+    largest = 0.0
     for target in np.random.default_rng(0).uniform(-0.2, 1.2, 40):
-        F, C = joint.update([target - last, 0.0, 0.0])
-        last, highest = target, max(highest, target)
-        flat = np.maximum(highest - deep, 0.0)
-        stress = np.sum(k.area * k.c1 * np.where(target > flat, phi(target) - phi(flat), 0.0))
-        scale = np.sum(k.area * k.c1) * phi(highest)
-        # rounding of Phi, of which small differences are taken
+        F, C = joint.update([target - closure, 0.0, 0.0])
+        closure = target
+        largest = max(largest, target)
+        indentation = np.maximum(largest - yield_closure, 0.0)
+        touches = target > indentation
+        stress = np.sum(k.area * k.c1 * np.where(touches, phi(target) - phi(indentation), 0.0))
+        plastic_work = np.sum(k.area * k.c1 * yield_closure * phi(indentation))
+        scale = np.sum(k.area * k.c1) * phi(largest)
+        # rounding of Phi, in a small difference
         assert abs(F[0] - stress) <= 1e-12 * scale
-        assert abs(joint.plastic_work - np.sum(k.area * k.c1 * deep * phi(flat))) <= 1e-12 * scale
+        assert abs(joint.plastic_work - plastic_work) <= 1e-12 * scale
         assert joint.plastic_work <= joint.dissipated_energy
-        if target < highest:  # unloading and reloading are elastic
+        if target < largest:  # unloading and reloading are elastic
             slope = k.curve.force(np.array(target))[1]
-            assert C[0, 0] == pytest.approx(
-                np.sum(k.area * k.c1 * np.where(target > flat, slope, 0.0)), rel=1e-12, abs=1e-300
-            )
+            stiffness = np.sum(k.area * k.c1 * np.where(touches, slope, 0.0))
+            assert C[0, 0] == pytest.approx(stiffness, rel=1e-12, abs=1e-300)
     assert joint.stored_energy >= 0.0
 
 
@@ -112,17 +119,18 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
     ("mu", "path"),
     [(0.0, 2 * [[0.0, 0.5]]), (0.4, 20 * [[0.6, 0.0], [0.6, 0.0], [-0.6, 0.0], [-0.6, 0.0]])],
 )
-def test_neither_shear_without_friction_nor_closing_wears_slopes(mu, path):
-    """Facets rub where a joint closes; real joints keep their slopes without shear."""
+def test_shear_without_friction_and_closing_do_not_degrade_asperities(mu, path):
+    """Facets slide where a joint closes; real joints keep their roughness without shear."""
     joint = law(mu=mu, mating_length=3.0, slope_wear=1e-3, plane=0.0).joint(0.3)
     for d in path:
         joint.update(d)
-    assert max(joint.F[1], joint.dissipated_energy) > 1e-3  # it climbs, or friction was lost
+    assert max(joint.F[1], joint.dissipated_energy) > 1e-3  # it climbs, or friction dissipates
     assert joint.slopes == 1.0
 
 
-def test_slopes_wear_by_the_work_of_shear():
-    """slopes = s + (1 - s) exp(-work/slope_wear), of the step before; lift goes with them."""
+def test_asperities_degrade_by_the_work_of_shear():
+    """slopes = s + (1 - s) exp(-work/slope_wear), of the step before; the dilation decreases with
+    them."""
     one = law(mu=0.4, mating_length=3.0, slope_wear=0.2, slope_residual=0.25, plane=0.0)
     joint = one.joint()
     joint.update([0.6, 0.0])
@@ -138,15 +146,20 @@ def test_slopes_wear_by_the_work_of_shear():
     np.testing.assert_allclose(y, expected, rtol=1e-12)
 
 
-PATHS, CYCLES = 34, 10  # of each of six kinds of law; docs/measure/energy_gain.py searches on 60
+PATHS = 34  # of each of six kinds of law; docs/measure/energy_gain.py searches on 60
+CYCLES = 10
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PATHS))]
 
 
 def random_joint(rng, fades, wears, yields=True):
-    """Any law of few facets, and the state (rows, 1) of a new joint; slopes that wear fade, too,
-    and where slopes fade one of three joints has never been mated."""
+    """Any law of few facets, and the state (rows, 1) of a new joint.
+
+    fades: with a mating length, which degradation (wears) implies; one of three such joints starts
+    unmated.
+    """
     a = float(rng.choice([1.0, rng.uniform(1.0, 1.6), rng.uniform(1.6, 5.0), 10.0]))
-    b, mu = rng.uniform(-1.0, 2.0), rng.choice([0.0, rng.uniform(0.0, 1.2), rng.uniform(1.2, 4.0)])
+    b = rng.uniform(-1.0, 2.0)
+    mu = rng.choice([0.0, rng.uniform(0.0, 1.2), rng.uniform(1.2, 4.0)])
     formation = [None, "population", "individual"][rng.integers(3)]
     # the printed heights are convex as a population from eta = 0.287
     eta = rng.uniform(0.3, 1.0) if formation == "population" else rng.choice([0.0, 0.5, 1.0])
@@ -171,83 +184,101 @@ def stored(k, states):
     return kernel.measures(k, states).stored
 
 
-def scale(k, states):
-    """Largest energy (J/m2) in the springs of a joint on its way, had none yielded: what is stored
-    is a small difference of such energies, and has their rounding."""
-    now, facets = kernel.parts(k, states), k.asperities
-    y = effective_closure(facets, now.delta, now.slopes)
-    return max(np.max((facets.area * facets.c1) @ facets.curve.energy(y)), stored(k, states).max())
+def energy_scale(k, states):
+    """Largest energy (J/m2) in the springs of a joint on its path if none yields.
+
+    The stored energy is a small difference of such energies, and has their rounding.
+    """
+    state = kernel.parts(k, states)
+    facets = k.asperities
+    y = effective_closure(facets, state.delta, state.slopes)
+    elastic = (facets.area * facets.c1) @ facets.curve.energy(y)
+    return max(np.max(elastic), stored(k, states).max())
 
 
-def gains(k, states, d):
-    """Energy (n,) that steps d (n, dim) between states (rows, n + 1) make, as a share of `scale`,
-    and what of it is rounding: of the energies of virgin curves that are tabulated, and of sums."""
-    most, rounding = scale(k, states), 1e-9 if len(k.asperities.curve.S) > 1 else 1e-11
-    begin, held = begun(k, states[:, :-1]), stored(k, states)
-    lowered = stored(k, begin) - held[:-1]  # by slopes that wear: no work is done
-    work = step_work(k, begin, d.T, np.full(len(d), 1e-3 * rounding * most))
-    made = held[1:] - held[:-1] - lowered - work
-    return np.maximum(np.maximum(made, made + lowered), lowered) / most, rounding
+def energy_gains(k, states, d):
+    """Energy (n,) that steps d (n, dim) between states (rows, n + 1) create, over `energy_scale`.
+
+    Also returns its rounding: of the energies of tabulated first-loading curves, and of sums.
+    """
+    scale = energy_scale(k, states)
+    rounding = 1e-9 if len(k.asperities.curve.S) > 1 else 1e-11
+    start = degraded(k, states[:, :-1])
+    energy = stored(k, states)
+    degradation = stored(k, start) - energy[:-1]  # by asperity degradation, without work
+    work = work_on_step_geometry(k, start, d.T, np.full(len(d), 1e-3 * rounding * scale))
+    gain = energy[1:] - energy[:-1] - degradation - work
+    return np.maximum(np.maximum(gain, gain + degradation), degradation) / scale, rounding
 
 
 @pytest.mark.parametrize("yields", [False, True])
 @pytest.mark.parametrize(("fades", "wears"), [(False, False), (True, False), (True, True)])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_no_step_of_a_random_path_makes_energy(seed, fades, wears, yields):
-    """Steps of a hundredth of the closure range to ten mating lengths, apart and shut again."""
+def test_no_step_of_a_random_path_creates_energy(seed, fades, wears, yields):
+    """Steps of a hundredth of the closure range to ten mating lengths, opened and closed again."""
     rng = np.random.default_rng(seed)
     one, state = random_joint(rng, fades, wears, yields)
-    k, corners = one.tables, random_corners(rng, 1)[0][:, : one.dim]
+    k = one.tables
+    corners = random_corners(rng, 1)[0][:, : one.dim]
     corners[:, 1:] *= 10.0 ** rng.uniform(-0.5, 1.5)
     legs = np.diff(corners, axis=0, prepend=0.0)
     d = np.concatenate([leg * rng.dirichlet(np.full(3, 0.5))[:, None] for leg in legs])
-    states = walk(k, state, d)
-    made, rounding = gains(k, states, d)
-    assert made.max() <= rounding
-    assert np.diff(kernel.parts(k, states).dissipated).min() >= -1e-12 * scale(k, states)
+    states = states_along(k, state, d)
+    gains, rounding = energy_gains(k, states, d)
+    assert gains.max() <= rounding
+    dissipation = np.diff(kernel.parts(k, states).dissipated)
+    assert dissipation.min() >= -1e-12 * energy_scale(k, states)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.05, 0.3])
-def test_the_ledger_tends_to_the_loss_and_is_nothing_without_friction(mu):
-    """Legs of 1, 10 and 100 steps: at most so many times the loss of 100 steps, and no less."""
+def test_dissipated_energy_converges_from_above_and_is_zero_without_friction(mu):
+    """Legs of 1, 10 and 100 steps."""
     rough = replace(jl.presets.load("westerly-rough"), plane=0.0)
-    one, lost = replace(rough, asperity=replace(rough.asperity, mu=mu)), []
+    one = replace(rough, asperity=replace(rough.asperity, mu=mu))
+    dissipated = []
     legs = one.closure_range * np.array([[0.5, 0.5], [0.0, -1.0], [0.3, 0.5]])
     for count in (1, 10, 100):
         joint = one.joint()
         for d in np.repeat(legs / count, count, axis=0):
             joint.update(d, tangent=False)
-        lost.append(joint.dissipated_energy)
-    assert (lost[2] > 0.0) == (mu > 0.0)
-    assert lost[2] <= lost[1] <= 1.03 * lost[2]
-    assert lost[1] <= lost[0] <= 1.3 * lost[2]
+        dissipated.append(joint.dissipated_energy)
+    coarse, fine, finest = dissipated
+    assert (finest > 0.0) == (mu > 0.0)
+    assert finest <= fine <= 1.03 * finest
+    assert fine <= coarse <= 1.3 * finest
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(CYCLES))
-def test_no_cycle_that_is_searched_for_returns_work(seed):
-    """An adversary: of many triangles from one state that with the least loss, and its children."""
+def test_no_cycle_of_a_search_returns_work(seed):
+    """Search many triangles from one state for the smallest dissipation, and vary the best."""
     rng = np.random.default_rng(seed)
     one, state = random_joint(rng, bool(seed % 2), bool(seed // 2 % 2))
     first = random_corners(rng, 1, legs=3)[0][:, : one.dim]
     first[-1, 0] = rng.uniform(0.2, 0.8)  # in touch
-    d, k, n = np.diff(first, axis=0, prepend=0.0), one.tables, 60
-    begin = np.tile(walk(k, state, d)[:, -1:], (1, n))
-    legs, size = rng.normal(size=(n, 2, one.dim)) * 10.0 ** rng.uniform(-2, 0, (n, 1, 1)), 1.0
-    best, least = legs[0], np.inf
+    approach = np.diff(first, axis=0, prepend=0.0)
+    k = one.tables
+    n = 60
+    start = np.tile(states_along(k, state, approach)[:, -1:], (1, n))
+    legs = rng.normal(size=(n, 2, one.dim)) * 10.0 ** rng.uniform(-2, 0, (n, 1, 1))
+    size = 1.0
+    best = legs[0]
+    smallest = np.inf
     for _ in range(6):
-        states, work = begin, 0.0
-        squares = np.sum(legs**2, axis=(1, 2))  # elastic energies go with them
+        states = start
+        work = 0.0
+        squares = np.sum(legs**2, axis=(1, 2))  # elastic energies are proportional to them
         for leg in (legs[:, 0], legs[:, 1], -legs.sum(axis=1)):
-            work = work + step_work(k, begun(k, states), leg.T, 1e-4 * squares)
+            work = work + work_on_step_geometry(k, degraded(k, states), leg.T, 1e-4 * squares)
             states = kernel.step(k, states, leg.T, False)[0]
-        lost = (work - stored(k, states) + stored(k, begin)) / squares
-        if lost.min() < least:
-            best, least = legs[lost.argmin()], lost.min()
+        dissipation = (work - stored(k, states) + stored(k, start)) / squares
+        if dissipation.min() < smallest:
+            best = legs[dissipation.argmin()]
+            smallest = dissipation.min()
         size *= 0.6
         legs = best * (1.0 + size * rng.normal(size=legs.shape))
     cycle = np.vstack([best, -best.sum(axis=0)])
-    d = np.vstack([d, cycle, cycle, cycle])
-    made, rounding = gains(k, walk(k, state, d), d)
-    assert max(made) <= rounding
-    assert sum(made[3:]) <= rounding
+    d = np.vstack([approach, cycle, cycle, cycle])
+    gains, rounding = energy_gains(k, states_along(k, state, d), d)
+    assert max(gains) <= rounding
+    assert sum(gains[3:]) <= rounding

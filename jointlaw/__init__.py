@@ -12,8 +12,9 @@ from .hosts import HOSTS
 from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .joints.pool import JointPool
-from .joints.state import NonFiniteError, load_state
+from .joints.state import JointState, NonFiniteError, load_state
 from .kernels.element import Element, ElementResponse
+from .kernels.engine import Step
 from .kernels.reference import LawTables
 from .laboratory.experiments import PathError, closure_test, direct_shear
 from .laboratory.record import TestRecord
@@ -55,6 +56,7 @@ __all__ = [
     "JointBatch",
     "JointLaw",
     "JointPool",
+    "JointState",
     "JointTable",
     "Law",
     "LawTables",
@@ -63,6 +65,7 @@ __all__ = [
     "PathError",
     "Resolution",
     "ShearCurve",
+    "Step",
     "TestRecord",
     "closed_form",
     "closure_test",

@@ -15,8 +15,6 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 import jointlaw as jl
-from jointlaw.joints.state import JointState
-from jointlaw.kernels.engine import Step
 
 from ..compiled import LawJointArrays, StepArrays, address
 from ..native.layout import MEASURES
@@ -83,8 +81,8 @@ class LawJoints:
         all_shown = np.zeros((places, len(MEASURES) + 2))
         all_F[: len(F)] = F
         all_shown[: len(shown)] = shown
-        self.step = Step(d, all_F, None, shown=all_shown)
-        self.silent_step = Step(d, all_F, None)
+        self.step = jl.Step(d, all_F, None, shown=all_shown)
+        self.silent_step = jl.Step(d, all_F, None)
 
     def allocate(self, m: int) -> np.ndarray:
         """Places (m,) for new contacts."""
@@ -109,14 +107,14 @@ class LawJoints:
         batch.reset(places, mated)
         if not bonded:
             batch.unbond(places)
-        is_intact = bonded and "damage" in self.law.tables.names
-        measures = dict.fromkeys(MEASURES, 0.0)
-        measures |= {"separated": 1.0, "damage": 0.0 if is_intact else 1.0}
+        measures = np.zeros((len(places), len(MEASURES)))
+        measures[:, MEASURES.index("separated")] = 1.0
+        measures[:, MEASURES.index("damage")] = batch.damage[places]
         self.step.F[places] = 0.0
-        self.step.shown[places] = [*measures.values(), *start]
+        self.step.shown[places] = np.column_stack([measures, np.tile(start, (len(places), 1))])
         return start
 
-    def restore(self, state: JointState) -> np.ndarray:
+    def restore(self, state: jl.JointState) -> np.ndarray:
         """Replace all joints by the joints of a snapshot; their places (n,)."""
         self.clear()
         places = self.allocate(len(state))
@@ -252,7 +250,7 @@ class Joints:
         stored_energy = np.empty(self.n)
         for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
             m = len(rows)
-            step = Step(
+            step = jl.Step(
                 d[rows] / self.reduction,
                 np.empty((m, 2)),
                 np.empty((m, 2, 2)),
@@ -360,7 +358,7 @@ class Joints:
                 raise ValueError(
                     "the state's joints are not those of the scene's laws and contacts"
                 )
-            place[rows] = joints.restore(JointState(str(fingerprint), values.T))
+            place[rows] = joints.restore(jl.JointState(str(fingerprint), values.T))
         self.first_touch = first_touch.copy()
         self.edge_pairs = edge_pairs
         self._arrange(law, place)

@@ -71,7 +71,7 @@ def test_factor_of_safety_of_a_block_on_a_plane(bonded):
     assert by_hand < 0.95 * bears(law, normal_stress) / shear_stress
     # The search loads the joint in one step, in which asperities that still stick bear less than
     # where they were closed before they are sheared.
-    assert 0.92 * by_hand < found < by_hand
+    assert 0.85 * by_hand < found < by_hand
 
 
 @pytest.mark.slow

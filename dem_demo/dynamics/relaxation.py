@@ -44,7 +44,7 @@ AT_REST = 1e-12  # unbalanced force (over the loads) that is rounding
 NEXT_NEWTON = 0.4  # of the unbalanced force of the last trial
 NEWTON_REACH = 0.5  # of the largest displacement: how far Newton's method may go
 MOVES = 0.01  # of the fastest block: slower ones are not unstable
-
+ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int)  # as in layout.h
 
 INPUT_ARRAYS = (
     "laws", "block_a", "block_b", "kinematics", "area", "start", "reduction", "load", "is_free",
@@ -113,6 +113,9 @@ class Relaxation:
         self.is_free = np.array(is_free, float, order="C")
         for name in WORK_ARRAYS:
             setattr(self, name, np.zeros(shape))
+        self.error: Exception | None = None  # of a step of the law in Python
+        self.callbacks: list[Any] = []  # which C holds
+        self.zero = np.zeros(1, np.int64)
         self.steps = [self._law_step(one, np.flatnonzero(law == i)) for i, one in enumerate(laws)]
         self.laws = (RelaxedLaw * len(laws))(*(self._law_arrays(*step) for step in self.steps))
         self.arrays = RelaxationArrays(
@@ -132,21 +135,48 @@ class Relaxation:
 
     def _law_arrays(self, batch: Any, step: Step, contact: np.ndarray) -> RelaxedLaw:
         """Addresses of a step for the compiled relaxation."""
-        call = step.call[1]
-        if call is None:
+        if not len(contact):
             return RelaxedLaw()
-        call.commit = call.track_dissipation = False
-        call.chunk = len(contact)
-        where = ctypes.addressof(call)
+        call = step.call[1]
+        if call is None:  # the numpy kernel, such as of a user's own law
+            advance: Any = self._advance_in_python(batch, step)
+            argument = None
+            next_joint = address(self.zero)
+        else:
+            call.commit = call.track_dissipation = False
+            call.chunk = len(contact)
+            advance = load_law_library().jlaw_run
+            argument = ctypes.addressof(call)
+            next_joint = argument + type(call).next.offset
         return RelaxedLaw(
-            advance=ctypes.cast(load_law_library().jlaw_run, ctypes.c_void_p).value,
-            batch=where,
-            next_joint=where + type(call).next.offset,
+            advance=ctypes.cast(advance, ctypes.c_void_p).value,
+            batch=argument,
+            next_joint=next_joint,
             contact=contact.ctypes.data,
             n_joints=len(contact),
             d=address(step.d),
             F=address(step.F),
         )
+
+    def _advance_in_python(self, batch: jl.JointBatch, step: Step) -> Any:
+        """A function that C calls for a step of the law; displacements and tractions are in `step`.
+
+        Where displacements are too large for the law, tractions are not finite, as in the compiled
+        law, and the iterations count as diverged.
+        """
+
+        def advance(_batch: int, _operation: int) -> int:
+            try:
+                batch.take(step)
+            except jl.NonFiniteError:
+                step.F[:] = np.nan
+            except Exception as error:  # C cannot pass it on: `_call` raises it
+                self.error = error
+                return -1
+            return 0
+
+        self.callbacks.append(ADVANCE(advance))
+        return self.callbacks[-1]
 
     def unbalanced(self, y: np.ndarray) -> np.ndarray:
         """Unbalanced forces (n, dof) of the free motions at displacements y (n, dof)."""
@@ -157,6 +187,8 @@ class Relaxation:
     def _call(self, name: str, *arguments: int) -> bool:
         """Call a compiled function; returns whether the iterations diverged."""
         status = self.arrays.call(name, *arguments)
+        if self.error is not None:
+            raise self.error
         if status < 0:
             raise MemoryError("no memory for a copy of a block of states")
         return bool(status)

@@ -28,9 +28,13 @@ def search_of(scene):
     return EquilibriumSearch(scene, blocks, manager, joints, sliding)
 
 
-@pytest.mark.parametrize("name", ["slope", "wet-slope", "tunnel", "bridges"])
-def test_compiled_forces_are_the_assembled_ones(name):
+@pytest.mark.parametrize(
+    ("name", "kernel"),
+    [("slope", ""), ("wet-slope", ""), ("tunnel", ""), ("bridges", ""), ("bridges", "numpy")],
+)
+def test_compiled_forces_are_the_assembled_ones(name, kernel, monkeypatch):
     """C sums over rows of contact points, Python multiplies by a sparse matrix."""
+    monkeypatch.setenv("JOINTLAW_KERNEL", kernel)
     search = search_of(weakened(load(name).excavated, 1.3))
     y = search.stick_predictor()
     rng = np.random.default_rng(0)
@@ -38,6 +42,20 @@ def test_compiled_forces_are_the_assembled_ones(name):
     expected = search.expand(search._unbalanced(y)[0])
     found = search._relaxation().unbalanced(search.expand(y))
     assert found == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
+
+
+def test_an_error_of_a_law_in_python_passes_through_the_compiled_iterations(monkeypatch):
+    monkeypatch.setenv("JOINTLAW_KERNEL", "numpy")
+    search = search_of(parse(on_base(coulomb(0.8), [2.0, 1.0], 20.0)))
+    relaxing = search._relaxation()
+
+    def fail(step):
+        raise ZeroDivisionError("in the law")
+
+    for batch, _, _ in relaxing.steps:
+        monkeypatch.setattr(batch, "take", fail)
+    with pytest.raises(ZeroDivisionError, match="in the law"):
+        relaxing.unbalanced(search.expand(search.zero))
 
 
 def block_in_space(dip, friction, azimuth=0.3):

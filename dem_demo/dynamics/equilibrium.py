@@ -16,7 +16,7 @@ in which it moved, so that it has released the forces that it exerted on the res
 and the others are solved again; blocks that only an unstable one supported show then. In the end
 the unstable blocks creep from their places as far as it takes to release those forces.
 
-A search that decides neither way counts as no equilibrium, and says so (`Verdict.NOT_DECIDED`).
+A search without a decision counts as no equilibrium, and is reported (`Verdict.NOT_DECIDED`).
 
 In-situ stress. Joints start with the closure and sliding at which they bear the given stress. The
 closure is not a displacement of the blocks, which are drawn in their places under stress: the
@@ -34,7 +34,7 @@ from scipy.sparse.linalg import spsolve
 from ..contact import ContactManager, Contacts, Joints
 from ..scene import Scene
 from .blocks import Blocks, apply_loads
-from .relaxation import MOVES, Relaxation, Verdict
+from .relaxation import UNSTABLE_FRACTION, Relaxation, Verdict
 from .timestep import contact_kinematics, opening_and_sliding_rates
 
 MAX_UNBALANCED_RATIO = 1e-3  # unbalanced force of a stable block, relative to its weight
@@ -60,7 +60,7 @@ MIN_RELEASE_RATIO = 0.9  # of residuals of two steps of creep, which ends above 
 MAX_FINISHING_ITERATIONS = 12  # of Newton's method after a relaxation
 HIGH_STRESS = 2e7  # Pa: bounds the stiffness of joints where nothing touches at first
 FIXING_DRAG = 1e25  # 1/s2: holds a block in its place
-PREDICTOR_FALL = 0.1  # of its reach: fall of a free block in the stick predictor
+PREDICTOR_FALL = 0.1  # of its radius: fall of a free block in the stick predictor
 
 # Repeated search and in-situ stress
 MAX_ROUNDS = 40
@@ -175,24 +175,24 @@ class EquilibriumSearch:
         while True:
             is_fixed = unstable[self.block]
             relaxed = relaxation.relax(self.expand(y), partial(self._finish, is_fixed))
-            moved = relaxed.y[self.blocks.is_free]
+            displacement = relaxed.y[self.blocks.is_free]
             if relaxed.verdict is Verdict.EQUILIBRIUM:
                 if (is_released := unstable & ~known_unstable).any():
-                    moved = self._creep(moved, unstable, is_released)
-                return Solution(moved, unstable, verdict)
+                    displacement = self._creep(displacement, unstable, is_released)
+                return Solution(displacement, unstable, verdict)
             if not name_unstable:
-                return Solution(moved, unstable, relaxed.verdict)
+                return Solution(displacement, unstable, relaxed.verdict)
             if relaxed.verdict is Verdict.NOT_DECIDED:
                 verdict = relaxed.verdict
             is_new = self._is_moving(relaxed.growth) & ~unstable
             if not is_new.any():
-                return Solution(moved, unstable, Verdict.NOT_DECIDED)
+                return Solution(displacement, unstable, Verdict.NOT_DECIDED)
             unstable |= is_new
-            y = self._release(start, moved, unstable)
+            y = self._release(start, displacement, unstable)
             relaxation.fix(unstable)
             if unstable[self.block].all():
-                moved = self._creep(y, unstable, unstable & ~known_unstable)
-                return Solution(moved, unstable, verdict)
+                displacement = self._creep(y, unstable, unstable & ~known_unstable)
+                return Solution(displacement, unstable, verdict)
 
     def _relaxation(self) -> Relaxation:
         """The relaxation of the blocks on the contacts of this search."""
@@ -222,10 +222,10 @@ class EquilibriumSearch:
     def _finish(self, is_fixed: np.ndarray, y: np.ndarray) -> np.ndarray | None:
         """Newton's method from displacements y (n, 3); is_fixed (m,): motions that stay."""
         start = y[self.blocks.is_free]
-        moved, _, converged = self._step(
+        displacement, _, converged = self._step(
             start, FIXING_DRAG * is_fixed, max_iterations=MAX_FINISHING_ITERATIONS
         )
-        return self.expand(moved) if converged.all() else None
+        return self.expand(displacement) if converged.all() else None
 
     def _distance(self, displacement: np.ndarray) -> np.ndarray:
         """Largest displacement (n,) in m of each block at scaled displacements (n, 3)."""
@@ -235,19 +235,19 @@ class EquilibriumSearch:
     def _is_moving(self, growth: np.ndarray) -> np.ndarray:
         """Blocks (n,) that move by more than a fraction of the fastest one."""
         distance = self._distance(growth)
-        return distance > MOVES * distance.max(initial=0.0)
+        return distance > UNSTABLE_FRACTION * distance.max(initial=0.0)
 
-    def _release(self, start: np.ndarray, moved: np.ndarray, unstable: np.ndarray) -> np.ndarray:
+    def _release(self, start: np.ndarray, end: np.ndarray, unstable: np.ndarray) -> np.ndarray:
         """Displacements (m,) from which the others are solved.
 
-        Unstable blocks (n,) have moved from `start` (m,) towards `moved` (m,) by no more than a few
+        Unstable blocks (n,) have moved from `start` (m,) towards `end` (m,) by no more than a few
         closures.
         """
         closure = self.start[: self.k] + (self.kinematics @ start)[: self.k]
         limit = RELEASE_CLOSURES * max(closure.max(initial=0.0), MIN_LENGTH)
-        distance = self._distance(self.expand(moved - start))
+        distance = self._distance(self.expand(end - start))
         fraction = unstable * np.minimum(1.0, limit / np.maximum(distance, 1e-300))
-        return start + fraction[self.block] * (moved - start)
+        return start + fraction[self.block] * (end - start)
 
     def _creep(self, y: np.ndarray, unstable: np.ndarray, is_released: np.ndarray) -> np.ndarray:
         """Displacements (m,) of the start: the others in equilibrium with creeping unstable blocks.
@@ -260,17 +260,17 @@ class EquilibriumSearch:
         creeps = is_released[self.block]
         creep_drag = max(RELEASE_DRAG * self._median_stiffness(y), 1e3 * self.drag_of_radius)
         drag = np.where(creeps, creep_drag, FIXING_DRAG * unstable[self.block])
-        moved = np.where(creeps, 0.0, y)
+        displacement = np.where(creeps, 0.0, y)
         residual = np.inf
         for _ in range(MAX_RELEASE_STEPS):
-            moved, unbalanced, converged = self._step(moved, drag)
+            displacement, unbalanced, converged = self._step(displacement, drag)
             if not converged.all():
                 return y
             previous_residual = residual
             residual = float(np.linalg.norm(unbalanced))
             if residual > MIN_RELEASE_RATIO * previous_residual:
                 break
-        return moved
+        return displacement
 
     def _median_stiffness(self, y: np.ndarray) -> float:
         """Median stiffness of the free motions at displacements y (m,), in 1/s2."""

@@ -9,8 +9,8 @@ then falls at 0.97 of its strength.
 Where Newton's method stops at a maximum of the unbalanced force, relaxation goes on, because it
 follows the forces. Where there is no equilibrium, the unbalanced force no longer falls while
 displacements grow at a steady rate: both together are the verdict "no equilibrium". A stall of the
-unbalanced force alone is none: blocks that rearrange stall for thousands of iterations. What is
-decided neither way within the limit of iterations is reported as such.
+unbalanced force alone is none: blocks that rearrange stall for thousands of iterations. A search
+without a decision within the limit of iterations is reported as such.
 """
 
 import ctypes
@@ -27,23 +27,23 @@ from jointlaw.native.library import load as load_law_library
 from ..compiled import RelaxationArrays, RelaxedLaw, address
 
 MASS_FACTOR = 0.28  # masses over row sums of the stiffness: 0.25 is the limit of stability
-CLOSURE_GROWTH = 1.6  # closures on the way over the first ones, which bound the stiffness
+CLOSURE_GROWTH = 1.6  # closures during the iterations over the first ones: bounds the stiffness
 OPEN_JOINT_STIFFNESS = 0.3  # of joints that are open at first, over the median of closed ones
-SMALLEST_MASS = 0.01  # over the median mass
-RAMP = 1000  # iterations over which loads come on
-WINDOW = 500  # iterations between two looks
+MIN_MASS_RATIO = 0.01  # over the median mass
+RAMP_ITERATIONS = 1000  # iterations over which loads come on
+CHECK_INTERVAL = 500  # iterations between two checks
 MAX_ITERATIONS = 200_000
-PATIENCE = 4  # windows that are compared with as many before
-STALLED = 0.93  # fall of the smallest unbalanced force above which it no longer falls
-STEADY = 0.8  # growth of displacements over that of before above which it is steady
-GROWING = 0.01  # of the largest displacement: growth that counts
-DIVERGED = 10.0  # unbalanced force over the smallest so far at which masses are raised
-HEAVIER = 4.0
-FIRST_NEWTON = 0.03  # unbalanced force (over the loads) at which Newton's method first tries
-AT_REST = 1e-12  # unbalanced force (over the loads) that is rounding
-NEXT_NEWTON = 0.4  # of the unbalanced force of the last trial
-NEWTON_REACH = 0.5  # of the largest displacement: how far Newton's method may go
-MOVES = 0.01  # of the fastest block: slower ones are not unstable
+COMPARED_INTERVALS = 4  # intervals that are compared with as many before
+STALL_RATIO = 0.93  # fall of the smallest unbalanced force above which it no longer falls
+STEADY_RATIO = 0.8  # growth of displacements over that of before above which it is steady
+MIN_GROWTH = 0.01  # of the largest displacement: growth that counts
+DIVERGENCE_RATIO = 10.0  # unbalanced force over the smallest so far at which masses are raised
+MASS_INCREASE = 4.0
+FIRST_NEWTON_FORCE = 0.03  # unbalanced force (over the loads) at which Newton's method first tries
+ROUNDING_FORCE = 1e-12  # unbalanced force (over the loads) that is rounding
+NEXT_NEWTON_RATIO = 0.4  # of the unbalanced force of the last trial
+MAX_NEWTON_CHANGE = 0.5  # of the largest displacement: how far Newton's method may go
+UNSTABLE_FRACTION = 0.01  # of the fastest block: slower ones are not unstable
 ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int)  # as in layout.h
 
 INPUT_ARRAYS = (
@@ -64,7 +64,7 @@ class Verdict(Enum):
 
 class Relaxed(NamedTuple):
     """Result of a relaxation: displacements y (motions,), the growth of each motion (motions,) in
-    the last windows, the verdict, iterations, and unbalanced force over the loads."""
+    the last intervals, the verdict, iterations, and unbalanced force over the loads."""
 
     y: np.ndarray
     growth: np.ndarray
@@ -119,7 +119,7 @@ class Relaxation:
         self.steps = [self._law_step(one, np.flatnonzero(law == i)) for i, one in enumerate(laws)]
         self.laws = (RelaxedLaw * len(laws))(*(self._law_arrays(*step) for step in self.steps))
         self.arrays = RelaxationArrays(
-            n_blocks=len(load), n_laws=len(laws), dim=dim, dof=shape[1], ramp=RAMP
+            n_blocks=len(load), n_laws=len(laws), dim=dim, dof=shape[1], ramp=RAMP_ITERATIONS
         )
         self.arrays.bind(self, *INPUT_ARRAYS, *WORK_ARRAYS)
         self.scale = float(np.linalg.norm(self.load)) or 1.0
@@ -197,8 +197,8 @@ class Relaxation:
         """Masses (n, dof) with which iterations are stable while joints close by no more than 1.6
         times their closure at y (n, dof)."""
         a, b, dof = self.block_a, self.block_b, y.shape[1]
-        moved = np.concatenate([y[a], y[b]], axis=1)
-        closure = self.start[:, 0] + np.einsum("km,km->k", self.kinematics[:, 0], moved)
+        both = np.concatenate([y[a], y[b]], axis=1)
+        closure = self.start[:, 0] + np.einsum("km,km->k", self.kinematics[:, 0], both)
         is_closed = closure > 0
         if is_closed.any():
             stiffness = self.stiffness_at(CLOSURE_GROWTH * closure)
@@ -213,7 +213,7 @@ class Relaxation:
             np.add.at(mass, block, np.einsum("k,kc,kcm->km", stiffness * self.area, row_sum, part))
         is_heavy = (self.is_free > 0) & (mass > 0)
         if is_heavy.any():
-            mass = np.maximum(mass, SMALLEST_MASS * np.median(mass[is_heavy]))
+            mass = np.maximum(mass, MIN_MASS_RATIO * np.median(mass[is_heavy]))
         return MASS_FACTOR * np.where(mass > 0, mass, 1.0)
 
     def fix(self, blocks: np.ndarray) -> None:
@@ -229,53 +229,53 @@ class Relaxation:
         none = np.zeros_like(y)
         self.first_force[:] = self.unbalanced(y)
         first_size = float(np.linalg.norm(self.first_force)) / self.scale
-        if first_size < FIRST_NEWTON and (found := finish(y)) is not None:
-            return Relaxed(found, none, Verdict.EQUILIBRIUM, 0, first_size)
+        if first_size < FIRST_NEWTON_FORCE and (solution := finish(y)) is not None:
+            return Relaxed(solution, none, Verdict.EQUILIBRIUM, 0, first_size)
         self.mass[:] = self.masses(y)
         self.arrays.done = 0
-        self.arrays.largest_force = DIVERGED * self.scale * max(1.0, first_size)
+        self.arrays.largest_force = DIVERGENCE_RATIO * self.scale * max(1.0, first_size)
         self._restart(y)
-        best, smallest, newton_at = y.copy(), np.inf, FIRST_NEWTON
+        best, smallest, newton_at = y.copy(), np.inf, FIRST_NEWTON_FORCE
         sizes: list[float] = []
         places: list[np.ndarray] = []
         while self.arrays.done < MAX_ITERATIONS:
-            if self._call("relax", WINDOW):
-                self.mass *= HEAVIER
+            if self._call("relax", CHECK_INTERVAL):
+                self.mass *= MASS_INCREASE
                 self._restart(best)
                 sizes.clear()
                 places.clear()
                 continue
             now = self.y.copy()
             self.mass[:] = np.maximum(self.mass, self.masses(now))
-            if self.arrays.done <= RAMP:
+            if self.arrays.done <= RAMP_ITERATIONS:
                 continue
             size = self.arrays.smallest_force / self.scale
             if size < smallest:
                 best, smallest = now, size
             if size < newton_at:
-                found = finish(now)
-                if found is not None and self._is_near(found, now):
-                    return Relaxed(found, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
-                newton_at = NEXT_NEWTON * size
-            if size < AT_REST:
+                solution = finish(now)
+                if solution is not None and self._is_near(solution, now):
+                    return Relaxed(solution, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
+                newton_at = NEXT_NEWTON_RATIO * size
+            if size < ROUNDING_FORCE:
                 return Relaxed(now, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
             sizes.append(size)
             places.append(now)
             growth = _steady_growth(sizes, places)
             if growth is not None:
                 return Relaxed(now, growth, Verdict.NO_EQUILIBRIUM, self.arrays.done, size)
-        growth = places[-1] - places[max(-1 - PATIENCE, -len(places))] if places else none
+        growth = places[-1] - places[max(-1 - COMPARED_INTERVALS, -len(places))] if places else none
         return Relaxed(self.y.copy(), growth, Verdict.NOT_DECIDED, self.arrays.done, smallest)
 
-    def _is_near(self, found: np.ndarray, y: np.ndarray) -> bool:
+    def _is_near(self, solution: np.ndarray, y: np.ndarray) -> bool:
         """Whether Newton's method ended near the displacements that it started from."""
-        reach = NEWTON_REACH * np.abs(y * self.is_free).max(initial=0.0)
-        return bool(np.abs((found - y) * self.is_free).max(initial=0.0) <= reach)
+        limit = MAX_NEWTON_CHANGE * np.abs(y * self.is_free).max(initial=0.0)
+        return bool(np.abs((solution - y) * self.is_free).max(initial=0.0) <= limit)
 
     def _restart(self, y: np.ndarray) -> None:
         """Begin at rest at displacements y (n, dof), with the loads of the present iteration."""
         self.v[:] = 0.0
-        fading = max(0.0, 1.0 - self.arrays.done / RAMP)
+        fading = max(0.0, 1.0 - self.arrays.done / RAMP_ITERATIONS)
         self.force[:] = self.unbalanced(y) - fading * self.first_force * self.is_free
         self.previous_force[:] = self.force
         self.previous_y[:] = y
@@ -283,13 +283,15 @@ class Relaxation:
 
 
 def _steady_growth(sizes: list[float], places: list[np.ndarray]) -> np.ndarray | None:
-    """Growth of displacements in the last windows where it is steady while the unbalanced force no
+    """Growth of displacements in the last intervals, if it is steady while the unbalanced force no
     longer falls; else None."""
-    if len(sizes) <= 2 * PATIENCE:
+    n = COMPARED_INTERVALS
+    if len(sizes) <= 2 * n:
         return None
-    growth = places[-1] - places[-1 - PATIENCE]
-    before = places[-1 - PATIENCE] - places[-1 - 2 * PATIENCE]
+    growth = places[-1] - places[-1 - n]
+    previous_growth = places[-1 - n] - places[-1 - 2 * n]
     fastest = np.abs(growth).max()
-    stalls = min(sizes[-PATIENCE:]) > STALLED * min(sizes[-2 * PATIENCE : -PATIENCE])
-    grows = fastest > GROWING * np.abs(places[-1]).max()
-    return growth if stalls and grows and fastest > STEADY * np.abs(before).max() else None
+    stalls = min(sizes[-n:]) > STALL_RATIO * min(sizes[-2 * n : -n])
+    grows = fastest > MIN_GROWTH * np.abs(places[-1]).max()
+    is_steady = fastest > STEADY_RATIO * np.abs(previous_growth).max()
+    return growth if stalls and grows and is_steady else None

@@ -142,14 +142,14 @@ def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> f
 def contact_kinematics(blocks: Blocks, contacts: Contacts) -> np.ndarray:
     """Rates of opening and sliding by the motions of block a, then of block b: (k, 2, 6).
 
-    Motions are scaled by the square root of their inertia; rows of motions that are not free are
-    zero.
+    Motions are scaled by the square root of their inertia; rows of prescribed motions are zero.
     """
     parts = []
     for block, sign in ((contacts.block_a, -1.0), (contacts.block_b, 1.0)):
         arm = contacts.position - (blocks.motion[0] + 1j * blocks.motion[1])[block]
-        way = sign * np.stack([contacts.normal, -1j * contacts.normal])
-        rates = np.stack([way.real, way.imag, (arm.conj() * way).imag], axis=2)
+        direction = sign * np.stack([contacts.normal, -1j * contacts.normal])
+        rotation = (arm.conj() * direction).imag
+        rates = np.stack([direction.real, direction.imag, rotation], axis=2)
         parts.append(rates * blocks.inverse_sqrt_inertia[block])
     return np.concatenate(parts, axis=2).transpose(1, 0, 2)
 

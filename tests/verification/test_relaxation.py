@@ -99,7 +99,7 @@ def test_a_block_in_space_stands_up_to_its_friction_angle(dip, verdict):
 
 def test_a_search_that_decides_nothing_says_so(monkeypatch):
     """It counts as no equilibrium in strength reduction."""
-    monkeypatch.setattr(relaxation, "MAX_ITERATIONS", 2 * relaxation.RAMP)
+    monkeypatch.setattr(relaxation, "MAX_ITERATIONS", 2 * relaxation.RAMP_ITERATIONS)
     scene = weakened(alone(load("slope"), "rough"), 1.45)
     search = search_of(scene)
     none = np.zeros(len(scene.blocks), bool)

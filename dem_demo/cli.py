@@ -1,259 +1,388 @@
-"""Command line: run a scene, check a scene file, resume a saved state, study a scene."""
+"""The command line of the block demo: run, validate and study scenes."""
 
 import argparse
+import contextlib
+import shutil
 import sys
+import textwrap
 import time
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from jointlaw import JointLaw, PathError, direct_shear
-from jointlaw.support.files import write_json
+from jointlaw import JointLaw, PathError, __version__, direct_shear
+from jointlaw.cli.command import Command, Option, option
+from jointlaw.cli.main import EXIT_INTERRUPTED, EXIT_INVALID_INPUT, Parser
+from jointlaw.support.files import SUMMARY, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
-from .output.folder import ABLATION, STRENGTH, require_free
+from .output.folder import ABLATION, STRENGTH, TRIALS, require_free
 from .output.monitors import friction_angle
-from .output.record import named, sentence, sentences, told
+from .output.pictures import Pictures
+from .output.record import RunRecord, format_blocks, format_outcome, list_blocks, report_lines
 from .output.run import run, steps_to
 from .scene import TEMPLATE, SceneError, load, shipped
 from .studies import ablate, compare, strength
 
-VERSION = 3  # of strength.json
-FAILING = 3.0  # s: most that a failing rock is run for
-TRIED, PATIENCE = 100, 1.0  # steps, and s, by which the time of a run is estimated
-MOBILISED = 0.9  # share of friction that a bond should wait for
-INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
-
+STRENGTH_VERSION = 4
+FAILURE_RUN_TIME = 3.0  # s: longest run to failure of a strength reduction
+TRIAL_STEPS = 100  # most steps, and
+TRIAL_TIME = 1.0  # s, by which the time of a run is estimated
+MOBILISED_FRICTION = 0.9  # fraction of peak friction that should be mobilised when a bond breaks
+LOW_STRESS = 0.1  # of the stress at the closure range: below it tractions are inaccurate
 ABOUT = """\
-Rigid rock blocks in 2-D whose every contact force comes from a joint law.
+Rigid rock blocks in 2-D. Every contact force comes from a rock-joint law.
 
-  python -m dem_demo [SCENE] --out DIR     run a scene: a name or a TOML file
-  python -m dem_demo new FILE              write a commented scene of a jointed rock to start from
-  python -m dem_demo check FILE            read a scene, find its equilibrium and time step
-  python -m dem_demo ablate SCENE --out DIR
-                                           run it without each of its ingredients in turn
-  python -m dem_demo compare SCENE [--seeds 1 2 3] [--until T]
-                                           every rock of a scene alone, with its own laws and with
-                                           Coulomb of the same strength, until a block has moved by
-                                           the usual size of a block
-  python -m dem_demo strength-reduction SCENE --out DIR
-                                           factor of safety of each rock (the strength of all
-                                           joints divided by it), its critical tilt, and how it
-                                           fails with 2 % less strength
-  python -m dem_demo resume DIR --out NEW [--until T] [--step DT]
-                                           go on from DIR, where a run left its state
+`python -m dem_demo SCENE` runs a scene of the package by name, or a TOML file.
 """
-OPTIONS = {
-    "scene": {"nargs": "?", "default": "tilt", "help": "a name or a TOML file (default tilt)"},
-    "file": {"type": Path},
-    "state": {"type": Path, "help": "folder of a run, or the state in it"},
-    "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
-    "--force": {"action": "store_true", "help": "replace another run in that folder"},
-    "--until": {"type": float, "help": "model time to stop at (s)"},
-    "--step": {"type": float, "help": "another time step (s)"},
-    "--no-pictures": {
-        "action": "store_const",
-        "const": None,
-        "dest": "format",
-        "default": FORMATS[0],
-        "help": "tables only",
-    },
-    "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
-    "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
-    "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
-}
+EXAMPLES = """\
+examples:
+  python -m dem_demo tilt --out out/tilt
+  python -m dem_demo new my-slope.toml
+  python -m dem_demo run --help
+"""
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Entry point; returns the exit code."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status: 0, 2 for invalid input or a run that stopped with
+    an error, 130 after Ctrl-C."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    verb = words.pop(0) if words and words[0] in COMMANDS else "run"
-    command, *options = COMMANDS[verb]
-    parser = argparse.ArgumentParser(
-        f"python -m dem_demo {verb}".removesuffix(" run"),
-        description=ABOUT,
-        epilog=f"scenes: {', '.join(shipped())}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    for option in options:
-        parser.add_argument(option, **OPTIONS[option])
     try:
-        given = parser.parse_args(words)
-        if getattr(given, "force", None) is False:
-            require_free(given.out)
-        command(given)
+        options = _parse(words)
+        if getattr(options, "force", None) is False:
+            require_free(options.out)
+        options.run(options)
     except KeyboardInterrupt as stop:
         print(f"dem_demo: {str(stop) or 'interrupted'}", file=sys.stderr)
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
     except (SceneError, PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
-        return 2
+        return EXIT_INVALID_INPUT
     return 0
 
 
-def _run(given: argparse.Namespace) -> None:
+def _parse(words: list[str]) -> argparse.Namespace:
+    """Parse the command line. Raises ValueError with one line for the user."""
+    parser = Parser(
+        prog="python -m dem_demo",
+        description=ABOUT,
+        epilog=f"{_scene_list()}\n\n{EXAMPLES}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=lambda options: parser.print_help())
+    parser.add_argument("--version", action="version", version=f"dem_demo {__version__}")
+    parsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    for command in COMMANDS:
+        subparser = parsers.add_parser(
+            command.name,
+            help=command.purpose,
+            description=command.purpose[0].upper() + command.purpose[1:] + ".",
+            epilog=f"example:\n  {command.example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        subparser.set_defaults(run=command.run)
+        for names, settings in command.options:
+            subparser.add_argument(*names, **settings)
+    if words and words[0] not in {*parsers.choices, "-h", "--help", "--version"}:
+        words = ["run", *words]  # a scene, or an option of a run
+    return parser.parse_args(words)
+
+
+def _scene_list() -> str:
+    """Names of the scenes of the package, in lines of the width of the help."""
+    width = shutil.get_terminal_size().columns - 2
+    names = ", ".join(shipped())
+    return textwrap.fill(f"scenes: {names}", width, subsequent_indent="  ", break_on_hyphens=False)
+
+
+@contextlib.contextmanager
+def _messages_for(as_json: bool) -> Iterator[None]:
+    """Print messages on the standard error stream if the standard output is JSON."""
+    with contextlib.redirect_stdout(sys.stderr if as_json else sys.stdout):
+        yield
+
+
+def _run(options: argparse.Namespace) -> None:
     """Run a scene, or a saved state, to its end."""
-    if given.vtk and not find_spec("meshio"):
+    if options.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
-    sim = (Simulation.load(given.state, given.step) if "state" in given
-           else Simulation(load(given.scene)))  # fmt: skip
-    _announce(sim, given.until)
-    dt = sim.dt
-    record, summary = run(sim, given.out, given.until, given.format, given.vtk)
-    if begun := summary["stages_begun_s"]:
-        said = ("not yet" if time is None else f"from {time:.3g} s" for time in begun)
-        print(f"stages of the excavation: {', '.join(said)}")
-    for line in sentences(record):
+    with _messages_for(options.json):
+        if options.command == "resume":
+            sim = Simulation.load(options.state, options.step)
+        else:
+            sim = Simulation(load(options.scene))
+        _describe(sim, options.until, options.format is not None)
+        dt = sim.dt
+        record, summary = run(sim, options.out, options.until, options.format, options.vtk)
+        _report(sim, record, summary, dt)
+        print(f"results in {options.out}")
+    if options.json:
+        print((options.out / SUMMARY).read_text(encoding="utf-8"), end="")
+
+
+def _report(sim: Simulation, record: RunRecord, summary: dict, initial_dt: float) -> None:
+    """Print the results of a run; initial_dt (s): time step at its start."""
+    if start_times := summary["stage_start_s"]:
+        starts = ("not started" if time is None else f"{time:.3g} s" for time in start_times)
+        print(f"excavation stages started at: {', '.join(starts)}")
+    for line in report_lines(record):
         print(line)
-    if sim.dt < dt:
-        print(f"the time step was halved to {sim.dt:.3g} s as joints closed or blocks fell")
+    if sim.dt < initial_dt:
+        print(
+            f"the time step was halved to {sim.dt:.3g} s, because joints stiffened or blocks fell"
+        )
     print(
-        f"energy balanced to {summary['largest_energy_error']:.1e}, smallest margin of the time "
-        f"step {summary['time_step_margin']:.2f}; results in {given.out}"
+        f"max. relative energy error {summary['max_energy_error']:.1e}, min. ratio of the "
+        f"stability limit to the time step {summary['time_step_margin']:.2f}"
     )
 
 
-def _announce(sim: Simulation, until: float | None = None) -> None:
-    steps, dt, limit = steps_to(sim, until), sim.dt, sim.limit.current
+def _describe(sim: Simulation, until: float | None = None, with_pictures: bool = True) -> None:
+    """Print size, time step, estimated time, rocks and unstable blocks of a simulation."""
+    scene = sim.scene
+    dt, limit = sim.dt, sim.limit.current
+    steps = steps_to(sim, until)
+    moving = sum(not block.fixed for block in scene.blocks)
+    print(f"{scene.title}: {moving} moving blocks, {sim.joints.n} contact points")
+    reason = ""
+    if sim.fraction_reason:
+        reason = f"; fraction {dt / limit:.2g}, because {sim.fraction_reason}"
     print(
-        f"{sim.scene.title}: {sum(not block.fixed for block in sim.scene.blocks)} moving blocks, "
-        f"{sim.joints.n} law points in reach"
+        f"time step {dt:.3g} s, stability limit {limit:.3g} s (ratio {limit / dt:.2f}{reason}), "
+        f"{steps} steps"
     )
-    why = (
-        f"; fraction {dt / limit:.2g}, because {sim.fraction_reason}" if sim.fraction_reason else ""
-    )
-    print(
-        f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}{why}), {steps} steps"
-    )
-    if seconds := _pace(sim) * steps:
-        size = (seconds >= 100) + (seconds >= 6000)
-        print(f"about {seconds / 60**size:.2g} {('s', 'min', 'hours')[size]} without pictures, "
-              "by its first steps")  # fmt: skip
-    for rock in sim.scene.rocks:
-        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
-              f"{len(rock.blocks) - len(rock.free)} fixed", *rock.messages, sep="\n  ")  # fmt: skip
-    if sim.unstable.any() and sim.scene.run.settle and not sim.time:
-        print(f"{sim.unstable.sum()} blocks cannot be held and move from the first step: "
-              f"{told(named(sim.scene, sim.unstable))}")  # fmt: skip
+    _print_estimate(sim, steps, until, with_pictures)
+    for rock in scene.rocks:
+        fixed = len(rock.blocks) - len(rock.free)
+        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, {fixed} fixed")
+        for message in rock.messages:
+            print(f"  {message}")
+    if sim.unstable.any() and scene.run.settle and not sim.time:
+        count = int(sim.unstable.sum())
+        blocks = f"{count} block has" if count == 1 else f"{count} blocks have"
+        print(f"{blocks} no static equilibrium and will move from the first step: "
+              f"{format_blocks(list_blocks(scene, sim.unstable))}")  # fmt: skip
 
 
-def _pace(sim: Simulation) -> float:
-    """Time (s) of a step, by the first ones of a copy; 0 where these are refused."""
-    copy, steps, started = Simulation(sim.scene, saved=sim.state()), 0, time.perf_counter()
-    with suppress(SceneError):
-        while steps < TRIED and time.perf_counter() < started + PATIENCE:
+def _print_estimate(sim: Simulation, steps: int, until: float | None, with_pictures: bool) -> None:
+    """Print the estimated time of a run, unless its first steps end with an error."""
+    step_time = _step_time(sim)
+    if not step_time or not steps:
+        return
+    text = f"estimated {_format_duration(step_time * steps)}"
+    if with_pictures:
+        end = sim.scene.run.end if until is None else until
+        frames = 1 + round((end - sim.time) / sim.scene.run.record)
+        drawing_time = Pictures(RunRecord(sim)).estimate_time(frames)
+        text += f", + {_format_duration(drawing_time)} for figures and animation"
+    print(text)
+
+
+def _format_duration(seconds: float) -> str:
+    """Format a time (s) with two digits."""
+    for factor, unit in ((3600.0, "hours"), (60.0, "min")):
+        if seconds >= 100 / 60 * factor:
+            return f"{seconds / factor:.2g} {unit}"
+    return f"{seconds:.2g} s"
+
+
+def _step_time(sim: Simulation) -> float:
+    """Time (s) of a step, from the first steps of a copy; 0 where these end with an error."""
+    copy = Simulation(sim.scene, saved=sim.state())
+    steps = 0
+    started = time.perf_counter()
+    with contextlib.suppress(SceneError):
+        while steps < TRIAL_STEPS and time.perf_counter() < started + TRIAL_TIME:
             copy.step()
             steps += 1
         return (time.perf_counter() - started) / steps
     return 0.0
 
 
-def _new(given: argparse.Namespace) -> None:
-    with given.file.open("xb") as file:  # OSError where it exists
+def _new(options: argparse.Namespace) -> None:
+    """Write the template of a scene."""
+    with options.file.open("xb") as file:  # OSError where it exists
         file.write(TEMPLATE.read_bytes())
-    print(f"{given.file} written; next: python -m dem_demo check {given.file}")
+    print(f"{options.file} written; next: python -m dem_demo check {options.file}")
 
 
-def _check(given: argparse.Namespace) -> None:
-    sim = Simulation(load(given.scene))
-    _announce(sim)
+def _check(options: argparse.Namespace) -> None:
+    """Validate a scene, and warn of laws that do not suit the stresses of their joints."""
+    sim = Simulation(load(options.scene))
+    _describe(sim)
     for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows_by_law, strict=True):
-        pressed = sim.joints.traction[rows, 0].max(initial=0.0)
+        stress = float(sim.joints.traction[rows, 0].max(initial=0.0))
         if isinstance(law, JointLaw):
-            _warn_of_range(name, law, float(pressed))
-            if law.bond and law.bond.cohesion and pressed > 0.0:
-                _warn_of_bond(name, law, float(pressed))
+            _warn_of_closure_range(name, law, stress)
+            if law.bond and law.bond.cohesion and stress > 0.0:
+                _warn_of_bond(name, law, stress)
     print("the scene is valid")
 
 
-def _warn_of_range(name: str, law: JointLaw, largest: float) -> None:
-    """Say what to write where a law has its cells for far more than this normal stress (Pa)."""
-    made = float(law.normal_stress(law.closure_range * law.resolution.lowest))
-    if law.tables.asperities.cells > 1 and 0.0 < largest < 0.1 * made:
+def _warn_of_closure_range(name: str, law: JointLaw, largest: float) -> None:
+    """Recommend a closure range where the cells of a law are placed for far larger stresses than
+    the largest normal stress (Pa) of its joints."""
+    cell_stress = float(law.normal_stress(law.closure_range * law.resolution.lowest))
+    if law.tables.asperities.cells > 1 and 0.0 < largest < LOW_STRESS * cell_stress:
         print(
-            f"law {name!r}: its joints bear {largest:.2g} Pa at most, but its depth cells are for "
-            f"{made:.2g} Pa, so that tractions err by up to 20 % (docs/accuracy.md). In "
+            f"law {name!r}: its joints carry {largest:.2g} Pa at most, but its depth cells are for "
+            f"{cell_stress:.2g} Pa, so that tractions err by up to 20 % (docs/accuracy.md). In "
             f"[laws.{name}] write closure_range = {law.closure(2.0 * largest):.2g}, in m, the "
             "closure at twice that stress; or save sliders by depth = 1 in its resolution"
         )
 
 
 def _warn_of_bond(name: str, law: JointLaw, stress: float) -> None:
-    """Say where a bond breaks before the asperities have slid as far as their friction needs."""
-    bare, slip = replace(law, bond=None), law.bond.cohesion / law.bond.shear_stiffness
-    borne = direct_shear(bare.joint(), to=[slip], normal=stress, steps=20).shear_stress[-1]
-    share = borne / (stress * np.tan(np.radians(friction_angle(bare, stress))))
-    if share < MOBILISED:
+    """Warn of a bond that breaks before the friction of the asperities is mobilised at a normal
+    stress (Pa)."""
+    unbonded = replace(law, bond=None)
+    slip = law.bond.cohesion / law.bond.shear_stiffness
+    shear = direct_shear(unbonded.joint(), to=[slip], normal=stress, steps=20).shear_stress[-1]
+    peak = stress * np.tan(np.radians(friction_angle(unbonded, stress)))
+    if shear < MOBILISED_FRICTION * peak:
         print(
-            f"law {name!r}: its bond breaks after {slip:.2g} m of shear, where the asperities bear "
-            f"{share:.0%} of their friction at {stress:.2g} Pa: the two strengths do not add up. "
-            'For cohesion that friction adds to, take kind = "coulomb" with cohesion and tension'
+            f"law {name!r}: its bond breaks after {slip:.2g} m of shear, when only "
+            f"{shear / peak:.0%} of the friction at {stress:.2g} Pa is mobilised: the strengths "
+            'do not add up. For cohesion in addition to friction, use kind = "coulomb" with '
+            "cohesion and tension"
         )
 
 
-def _ablate(given: argparse.Namespace) -> None:
-    given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
-    print(ablate.write(ablate.ablate(load(given.scene), given.until), given.out))
-    print(f"results in {given.out}: {ABLATION}")
+def _ablate(options: argparse.Namespace) -> None:
+    """Run a scene without each of its ingredients in turn."""
+    options.out.mkdir(parents=True, exist_ok=True)  # raises before the work if it cannot be made
+    print(ablate.write(ablate.ablate(load(options.scene), options.until), options.out))
+    print(f"results in {options.out}: {ABLATION}")
 
 
-def _compare(given: argparse.Namespace) -> None:
-    scene = load(given.scene)
+def _compare(options: argparse.Namespace) -> None:
+    """Run each rock of a scene with its own laws and with Coulomb's law."""
+    scene = load(options.scene)
     if not scene.rocks:
-        raise ValueError(f"{given.scene} has no [[rock]] to compare")
-    for row in compare.compare(scene, given.seeds, given.until):
+        raise ValueError(f"{options.scene} has no [[rock]] to compare")
+    for row in compare.compare(scene, options.seeds, options.until):
         for name, law in row["laws"].items():
-            peak, left = np.degrees(np.arctan([law.friction, law.residual_friction or 0.0]))
-            print(f"law {name!r} as Coulomb: {peak:.1f} degrees at the peak, {left:.1f} after "
+            peak, residual = np.degrees(np.arctan([law.friction, law.residual_friction or 0.0]))
+            print(f"law {name!r} as Coulomb: {peak:.1f} degrees at the peak, {residual:.1f} after "
                   f"{1e3 * law.weakening:.2g} mm")  # fmt: skip
+        message = f"; stopped: {row['stopped']}" if row["stopped"] else ""
         print(f"seed {row['seed']}, {row['law']:7s} after {row['time_s']:.3g} s, "
-              f"{sentence(row)} {row['refused']}", flush=True)  # fmt: skip
+              f"{format_outcome(row)}{message}", flush=True)  # fmt: skip
 
 
-def _reduce(given: argparse.Namespace) -> None:
-    scene, rows = load(given.scene), []
-    if any(isinstance(law, JointLaw) and law.slope_wear < np.inf for law in scene.laws.values()):
-        print("slope_wear has no effect on these numbers: they are too high")
-    given.out.mkdir(parents=True, exist_ok=True)
-    if given.force:
-        (given.out / strength.FILE).unlink(missing_ok=True)
-    until = min(scene.run.end, FAILING) if given.until is None else given.until
-    texts = {
-        "factor_of_safety": "factor of safety",
-        "factor_without": "factor of safety without those",
-        "critical_tilt": "critical tilt in degrees",
+def _reduce_strength(options: argparse.Namespace) -> None:
+    """Compute factor of safety and critical tilt of each rock."""
+    with _messages_for(options.json):
+        scene = load(options.scene)
+        laws = scene.laws.values()
+        if any(isinstance(law, JointLaw) and law.slope_wear < np.inf for law in laws):
+            print("slope_wear has no effect on factor and tilt: they are too high")
+        options.out.mkdir(parents=True, exist_ok=True)
+        if options.force:
+            (options.out / TRIALS).unlink(missing_ok=True)
+        default_end = min(scene.run.end, FAILURE_RUN_TIME)
+        until = default_end if options.until is None else options.until
+        tell = partial(print, flush=True)
+        rows = []
+        try:
+            for row in strength.strength_reduction(scene, until, options.out, options.format, tell):
+                print(f"{row['rock']}: {_format_strength(row)}", flush=True)
+                rows.append(row)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                f"interrupted; {options.out / TRIALS} has all finished trials: the same command "
+                "continues"
+            ) from None
+        write_json(options.out / STRENGTH, {"version": STRENGTH_VERSION, "rows": rows})
+        print(f"{STRENGTH} and pictures of the failure in {options.out}")
+    if options.json:
+        print((options.out / STRENGTH).read_text(encoding="utf-8"), end="")
+
+
+def _format_strength(row: dict[str, Any]) -> str:
+    """Format factor of safety and critical tilt for the terminal."""
+    names = {
+        "factor_of_safety": ("factor of safety", ""),
+        "factor_without_excluded": ("factor of safety without unstable blocks", ""),
+        "critical_tilt": ("critical tilt", " degrees"),
     }
-    tell = partial(print, flush=True)
-    try:
-        for row in strength.strength_reduction(scene, until, given.out, given.format, tell):
-            said = (
-                f"no {text}" if row[key] is None else f"{text} {row[key]:.3g}"
-                for key, text in texts.items()
-                if key in row
-            )
-            print(f"{row['rock']}: {', '.join(said)}", flush=True)
-            rows.append(row)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            f"interrupted; {given.out / strength.FILE} has all finished trials: the same command "
-            "goes on"
-        ) from None
-    write_json(given.out / STRENGTH, {"version": VERSION, "rows": rows})
-    print(f"{STRENGTH} and pictures of the failure in {given.out}")
+    return ", ".join(
+        f"no {name}" if row[key] is None else f"{name} {row[key]:.3g}{unit}"
+        for key, (name, unit) in names.items()
+        if key in row
+    )
 
 
-RUN = "--out", "--force", "--until", "--no-pictures", "--format", "--vtk"
-COMMANDS = {
-    "run": (_run, "scene", *RUN),
-    "resume": (_run, "state", *RUN, "--step"),
-    "new": (_new, "file"),
-    "check": (_check, "scene"),
-    "ablate": (_ablate, "scene", "--out", "--force", "--until"),
-    "compare": (_compare, "scene", "--seeds", "--until"),
-    "strength-reduction": (_reduce, "scene", "--out", "--force", "--until", "--format"),
-}
+SCENE = option("scene", help="a scene of the package by name, or a TOML file")
+OUT = option("--out", type=Path, default=Path("out"), help="folder for the results (default: out)")
+FORCE = option("--force", action="store_true", help="replace another run in that folder")
+UNTIL = option("--until", type=float, metavar="T", help="model time to stop at (s)")
+FORMAT = option(
+    "--format", choices=FORMATS, default=FORMATS[0], help=f"of pictures (default: {FORMATS[0]})"
+)
+JSON = option("--json", action="store_true", help="print the JSON results on the standard output")
+OUTPUT: tuple[Option, ...] = (
+    OUT,
+    FORCE,
+    UNTIL,
+    option(
+        "--no-pictures",
+        action="store_const",
+        const=None,
+        dest="format",
+        default=FORMATS[0],
+        help="write tables only",
+    ),
+    FORMAT,
+    option("--vtk", action="store_true", help="write VTK files for ParaView too (needs meshio)"),
+    JSON,
+)
+COMMANDS = (
+    Command(
+        "run", "run a scene and write tables, pictures and an animation",
+        "python -m dem_demo run tilt --out out/tilt", _run, (SCENE, *OUTPUT),
+    ),
+    Command(
+        "new", "write a commented scene of a jointed rock slope to start from",
+        "python -m dem_demo new my-slope.toml", _new,
+        (option("file", type=Path, help="TOML file to write"),),
+    ),
+    Command(
+        "check", "validate a scene, find its static equilibrium and time step",
+        "python -m dem_demo check slope", _check, (SCENE,),
+    ),
+    Command(
+        "resume", "continue a run from its saved state",
+        "python -m dem_demo resume out/tilt --until 40 --out out/tilt-2", _run,
+        (
+            option("state", type=Path, help="folder of a run, or the state folder in it"),
+            *OUTPUT,
+            option("--step", type=float, metavar="DT", help="another time step (s)"),
+        ),
+    ),
+    Command(
+        "strength-reduction", "compute factor of safety and critical tilt of each rock",
+        "python -m dem_demo strength-reduction slope --out out/strength", _reduce_strength,
+        (SCENE, OUT, FORCE, UNTIL, FORMAT, JSON),
+    ),
+    Command(
+        "compare", "run each rock with its own laws and with Coulomb's law of the same strength",
+        "python -m dem_demo compare slope --seeds 1 2 3 --until 10", _compare,
+        (
+            SCENE,
+            option("--seeds", type=int, nargs="+", default=[1, 2, 3], metavar="SEED",
+                   help="seeds of the joint sets (default: 1 2 3)"),
+            UNTIL,
+        ),
+    ),
+    Command(
+        "ablate", "run a scene without each of its ingredients in turn",
+        "python -m dem_demo ablate slope --out out/ablate", _ablate, (SCENE, OUT, FORCE, UNTIL),
+    ),
+)  # fmt: skip

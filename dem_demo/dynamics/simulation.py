@@ -461,7 +461,7 @@ class Simulation:
 
         Raises ValueError if the file is missing, damaged or of another version.
         """
-        places = [Path(folder) / part / FILE for part in ("", "state", "refused")]
+        places = [Path(folder) / part / FILE for part in ("", "state", "last_valid_state")]
         file = next((place for place in places if place.is_file()), None)
         if not file:
             raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")

@@ -1,12 +1,14 @@
-"""Pictures of a run: how far the blocks have moved and the state of their joints, one frame or a
-GIF; and curves."""
+"""Pictures of a run: displacements of blocks and states of joints, as one frame or an animation;
+and curves."""
 
+import time
 from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap, Normalize, to_rgba
@@ -18,185 +20,249 @@ from jointlaw.support.pyplot import escape_math, style, written
 
 from ..scene import median_size, rotation
 from .monitors import shear_curve
-from .record import CREEP, Record, sentences
+from .record import CREEP_RATE, RunRecord, report_lines
 
-FIXED, MARKED, WATER = "#8d8d8d", "#c2187a", "#1f6fd0"
-MOVED = ListedColormap(colormaps["Purples"](np.linspace(0.05, 0.65, 100)))
-STATES = {  # of a joint: colour and line
-    "stuck": ("#3a3a3a", "-"), "partly sliding": ("#e69f00", "-"), "sliding": ("#d81b1b", "-"),
+FIXED_COLOUR = "#8d8d8d"
+MARKED_COLOUR = "#c2187a"
+WATER_COLOUR = "#1f6fd0"
+DISPLACEMENT_COLOURS = ListedColormap(colormaps["Purples"](np.linspace(0.05, 0.65, 100)))
+JOINT_STATES = {  # colour and line style
+    "stuck": ("#3a3a3a", "-"),
+    "partly sliding": ("#e69f00", "-"),
+    "sliding": ("#d81b1b", "-"),
     "open": ("#1f9ed1", "--"),
-}  # fmt: skip
-PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
-FRAMES, RATE, DPI = 60, 11, 75  # of an animation: most frames, frames per second
-FEW = 12  # blocks: most that bear their names
-ARROW = 0.02  # of the farthest: shorter ways bear no arrow
+}
+# Fractions of the shear capacity in sliding: up to the first a joint is stuck, from the second on
+# it slides
+STUCK_FRACTION = 0.05
+SLIDING_FRACTION = 0.9
+OPEN_STRESS = 1e-3  # of the normal stress that line widths are scaled by: below it a joint is open
+MAX_FRAMES = 60  # of an animation
+FRAME_RATE = 11  # 1/s
+ANIMATION_DPI = 75
+FINAL_COST = 4.0  # time to draw the last frame over the time of a frame of the animation: pixels
+MAX_NAMED_BLOCKS = 12  # in a picture with more blocks none bears its name
+MIN_ARROW = 0.02  # of the largest displacement: smaller ones get no arrow
+MARGIN = 0.07  # of the extent of the blocks
+LINE_WIDTHS = 0.7, 2.0, 1.2  # points: without stress, more at the scale; stress at the limit
 
 
-def outlines(record: Record, i: int) -> list[np.ndarray]:
-    """Corners (m, 2) of all blocks in frame i (m); NaN for those that are gone."""
+def outlines(record: RunRecord, i: int) -> list[np.ndarray]:
+    """Corners (m, 2) of all blocks in frame i (m); NaN for removed blocks."""
     return [
         block.local @ rotation(angle).T + [x, y]
         for block, (x, y, angle) in zip(record.scene.blocks, record.motion[i][:3].T, strict=True)
     ]
 
 
-def pressure(stress: float) -> tuple[float, str]:
-    """The unit in which a stress (Pa) is told, and what it is times Pa."""
+def stress_unit(stress: float) -> tuple[float, str]:
+    """Factor from Pa to the unit in which a stress (Pa) is written, and the unit."""
     return (1e-6, "MPa") if stress >= 1e6 else (1e-3, "kPa")
 
 
 class Pictures:
-    """Draws a run, all frames to one scale: low, high (2,) in m, of the blocks that move and what
-    is beside them; colours by distances moved, up to `most` (m); widths by `stress` (Pa).
+    """Draws the frames of a run, all to one scale.
 
-    That is the stress of the start, or of all frames where nothing touches then: those of impacts
-    would make all others hair lines. title: that of the scene unless another is given; marked (n,):
-    blocks to be marked, and what they are; without it those that nothing held at the start.
+    title: of the scene, unless another one is given. marked (n,): blocks to be marked, and `mark`,
+    their name in the legend; by default the blocks that are unstable at the start.
+
+    low, high (2,): visible range (m), of the blocks that move. max_distance: largest displacement
+    (m), for the colours. stress: normal stress (Pa), for the line widths: of the start, or of all
+    frames if no joint is closed at the start, because stresses of impacts would turn all other
+    joints into hair lines.
     """
 
     def __init__(
-        self, record: Record, title: str | None = None, marked: np.ndarray | None = None,
-        mark: str = "block that nothing holds",
+        self, record: RunRecord, title: str | None = None, marked: np.ndarray | None = None,
+        mark: str = "unstable block",
     ) -> None:  # fmt: skip
-        self.record, self.title = record, title or record.scene.title
-        self.marked, self.mark = record.loose if marked is None else marked, mark
+        self.record = record
+        self.title = title or record.scene.title
+        self.marked = record.unstable if marked is None else marked
+        self.mark = mark
         blocks = record.scene.blocks
         corners = np.concatenate([
             shape for i in (0, -1)
             for block, shape in zip(blocks, outlines(record, i), strict=True) if block.moves
         ])  # fmt: skip
         low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
-        margin = 0.07 * (high - low).max()
-        self.low, self.high = low - margin, high + margin
+        margin = MARGIN * (high - low).max()
+        self.low = low - margin
+        self.high = high + margin
         self.free = np.array([not block.fixed for block in blocks])
-        self.most = max(float(np.nanmax(record.moved[self.free])), 1e-6)
+        self.max_distance = max(float(np.nanmax(record.distances[self.free])), 1e-6)
         size = median_size(block for block in blocks if not block.fixed)
-        self.longer = float(f"{0.5 * size / self.most:.0e}")  # of arrows than what they stand for
-        self.unit, self.name = (1e3, "mm") if self.most < 0.1 else (1.0, "m")
+        self.arrow_scale = float(f"{0.5 * size / self.max_distance:.0e}")
+        is_small = self.max_distance < 0.1
+        self.length_factor, self.length_unit = (1e3, "mm") if is_small else (1.0, "m")
         frames = [frame["normal_stress_Pa"] for frame in record.joints]
-        start, whole = (stress[stress > 0] for stress in (frames[0], np.concatenate(frames)))
-        pressed = start if len(start) else whole
-        self.stress = float(np.quantile(pressed, 0.9)) if len(pressed) else 1.0
+        at_start, whole_run = (stress[stress > 0] for stress in (frames[0], np.concatenate(frames)))
+        compressive = at_start if len(at_start) else whole_run
+        self.stress = float(np.quantile(compressive, 0.9)) if len(compressive) else 1.0
 
     def states(self, i: int) -> np.ndarray:
-        """State (k,) of the joints of frame i, as one of the names in STATES.
+        """State (k,) of the joints of frame i, as one of the names in JOINT_STATES.
 
-        A joint that moves along itself slower than CREEP is stuck, whatever part of its asperities
-        waits at the friction limit.
+        A joint that slips slower than CREEP_RATE is stuck, even if a part of its asperities is at
+        the friction limit.
         """
-        now = self.record.joints[i]
-        shares = now["slipping"] / np.maximum(1 - now["separated"], 1e-12)
-        rests = np.abs(now["sliding_m/s"]) <= CREEP
-        is_open = now["normal_stress_Pa"] <= 1e-3 * self.stress
-        asked = [is_open, rests | (shares <= PARTIAL), shares <= FULL]
-        return np.select(asked, ["open", "stuck", "partly sliding"], "sliding")
+        joints = self.record.joints[i]
+        fraction = joints["slipping"] / np.maximum(1 - joints["separated"], 1e-12)
+        is_resting = np.abs(joints["slip_rate_m/s"]) <= CREEP_RATE
+        is_open = joints["normal_stress_Pa"] <= OPEN_STRESS * self.stress
+        conditions = [
+            is_open,
+            is_resting | (fraction <= STUCK_FRACTION),
+            fraction <= SLIDING_FRACTION,
+        ]
+        return np.select(conditions, ["open", "stuck", "partly sliding"], "sliding")
 
     def figure(self) -> tuple[Figure, Axes]:
-        """An empty frame with its legend: states, a round stress, how long the arrows are."""
-        (wide, high), scene = self.high - self.low, self.record.scene
-        across = min(6.5, 6.0 * wide / high)
-        figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 2.6))
-        stress, unit, name = float(f"{self.stress:.1g}"), *pressure(self.stress)
-        lines = [
-            *((f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
-              for state, (colour, line) in STATES.items()),
-            (f"{'effective ' * scene.wet}normal stress {unit * stress:g} {name}",
-             {"color": STATES["stuck"][0], "lw": self._width(stress)}),
-            (f"displacement, drawn × {self.longer:g}", {"color": "k", "lw": 1.0, "marker": ">"}),
-            *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
-            *[(self.mark, {"color": MARKED, "lw": 2.0})] * bool(self.marked.any()),
-        ]  # fmt: skip
-        figure.legend(handles=[Line2D([], [], label=label, **drawn) for label, drawn in lines],
-                      loc="outside lower center", ncols=3, frameon=False)  # fmt: skip
-        axes, scale = figure.add_subplot(), Normalize(0.0, self.unit * self.most)
+        """Create an empty frame with legend and colour bar."""
+        width, height = self.high - self.low
+        inches = min(6.5, 6.0 * width / height)
+        figure = Figure(figsize=(max(inches + 1.0, 7.5), inches * height / width + 2.6))
+        handles = [Line2D([], [], label=label, **line) for label, line in self._legend()]
+        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+        axes = figure.add_subplot()
+        scale = Normalize(0.0, self.length_factor * self.max_distance)
         figure.colorbar(
-            ScalarMappable(scale, MOVED), ax=axes, location="bottom", aspect=50,
-            label=f"moved since the start ({self.name})",
+            ScalarMappable(scale, DISPLACEMENT_COLOURS), ax=axes, location="bottom", aspect=50,
+            label=f"displacement since the start ({self.length_unit})",
         )  # fmt: skip
         return figure, axes
 
+    def _legend(self) -> list[tuple[str, dict]]:
+        """Labels and line properties of the legend."""
+        scene = self.record.scene
+        stress = float(f"{self.stress:.1g}")
+        factor, unit = stress_unit(stress)
+        entries: list[tuple[str, dict]] = [
+            (f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
+            for state, (colour, line) in JOINT_STATES.items()
+        ]
+        effective = "effective " if scene.wet else ""
+        stress_line = {"color": JOINT_STATES["stuck"][0], "lw": self._line_width(stress)}
+        entries.append((f"{effective}normal stress {factor * stress:g} {unit}", stress_line))
+        arrow = {"color": "k", "lw": 1.0, "marker": ">"}
+        entries.append((f"displacement, drawn × {self.arrow_scale:g}", arrow))
+        if scene.water:
+            entries.append(("water table", {"color": WATER_COLOUR, "ls": "-."}))
+        if self.marked.any():
+            entries.append((self.mark, {"color": MARKED_COLOUR, "lw": 2.0}))
+        return entries
+
     def draw(self, axes: Axes, i: int, note: str = "") -> None:
-        """Frame i: blocks, colour and arrow by displacement; joints, colour by state, width by
-        normal stress; a note below the title."""
-        record, blocks, shapes = self.record, self.record.scene.blocks, outlines(self.record, i)
-        moved = record.displaced(i)
-        colours = MOVED(np.hypot(*moved.T) / self.most)
-        colours[~self.free] = to_rgba(FIXED)
-        for which, edge, width in ((~self.marked, "0.45", 0.6), (self.marked, MARKED, 2.0)):
-            axes.add_collection(PolyCollection(
-                [shapes[j] for j in np.flatnonzero(which)], facecolors=colours[which],
-                edgecolors=edge, linewidths=width,
-            ))  # fmt: skip
-        far = self.free & (np.hypot(*moved.T) > ARROW * self.most)
-        tails, arrows = record.motion[i][:2].T[far], self.longer * moved[far]
+        """Draw frame i: colour and arrow of blocks by displacement; colour of joints by state,
+        width by normal stress; a note below the title."""
+        record = self.record
+        shapes = outlines(record, i)
+        displacements = record.displacements(i)
+        self._draw_blocks(axes, shapes, displacements)
+        large = self.free & (np.hypot(*displacements.T) > MIN_ARROW * self.max_distance)
+        tails = record.motion[i][:2].T[large]
+        arrows = self.arrow_scale * displacements[large]
         axes.quiver(
             *tails.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, width=0.003, zorder=5
         )
-        if len(blocks) <= FEW:
-            for block, shape in zip(blocks, shapes, strict=True):
-                name = escape_math(block.name)
-                axes.text(*shape.mean(axis=0), name, ha="center", va="center", clip_on=True)
         if record.scene.water:
-            axes.plot(*record.scene.water.line.T, color=WATER, lw=1.5, ls="-.", zorder=4)
-        ends, state = record.joints[i]["ends"], self.states(i)
-        widths = self._width(record.joints[i]["normal_stress_Pa"])
-        for name, (colour, line) in STATES.items():
-            here = state == name
-            axes.add_collection(
-                LineCollection(
-                    ends[here], linewidths=widths[here], colors=colour, ls=line, zorder=3
-                )
-            )
+            axes.plot(*record.scene.water.line.T, color=WATER_COLOUR, lw=1.5, ls="-.", zorder=4)
+        self._draw_joints(axes, i)
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
                  ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
         title = f"{self.title}\nt = {record.times[i]:.2f} s{note}"
         axes.figure.suptitle(escape_math(title))
 
+    def _draw_blocks(self, axes: Axes, shapes: list[np.ndarray], displacements: np.ndarray) -> None:
+        """Draw the blocks, coloured by displacement, and their names if they are few."""
+        blocks = self.record.scene.blocks
+        colours = DISPLACEMENT_COLOURS(np.hypot(*displacements.T) / self.max_distance)
+        colours[~self.free] = to_rgba(FIXED_COLOUR)
+        for mask, edge, width in ((~self.marked, "0.45", 0.6), (self.marked, MARKED_COLOUR, 2.0)):
+            axes.add_collection(PolyCollection(
+                [shapes[j] for j in np.flatnonzero(mask)], facecolors=colours[mask],
+                edgecolors=edge, linewidths=width,
+            ))  # fmt: skip
+        if len(blocks) <= MAX_NAMED_BLOCKS:
+            for block, shape in zip(blocks, shapes, strict=True):
+                name = escape_math(block.name)
+                axes.text(*shape.mean(axis=0), name, ha="center", va="center", clip_on=True)
+
+    def _draw_joints(self, axes: Axes, i: int) -> None:
+        """Draw the joints of frame i, coloured by state, as wide as their normal stress."""
+        joints = self.record.joints[i]
+        states = self.states(i)
+        widths = self._line_width(joints["normal_stress_Pa"])
+        for state, (colour, line) in JOINT_STATES.items():
+            mask = states == state
+            axes.add_collection(
+                LineCollection(
+                    joints["ends"][mask], linewidths=widths[mask], colors=colour, ls=line, zorder=3
+                )
+            )
+
     @style()
     def final(self, path: Path) -> None:
-        """The last frame, with slip angles and what became of each rock."""
+        """Draw the last frame, with slip angles and the outcome of each rock."""
         figure, axes = self.figure()
-        said = [line.partition(";")[0] for line in sentences(self.record)]  # what fits a phone
-        self.draw(axes, len(self.record.times) - 1, "\n".join(["", *said]))
+        lines = [line.partition(";")[0] for line in report_lines(self.record)]  # fits a phone
+        self.draw(axes, len(self.record.times) - 1, "\n".join(["", *lines]))
         written(figure, path)
 
     @style()
     def animation(self, path: Path) -> None:
-        """The whole run as GIF, at a constant rate of model time."""
-        n = len(self.record.times)
-        frames = np.linspace(0, n - 1, min(n, FRAMES)).round().astype(int).tolist()
-        (figure, axes), writer = self.figure(), PillowWriter(RATE)
-        with writer.saving(figure, path, DPI):
+        """Draw the whole run as GIF, at a constant rate of model time."""
+        count = len(self.record.times)
+        frames = np.linspace(0, count - 1, min(count, MAX_FRAMES)).round().astype(int).tolist()
+        (figure, axes), writer = self.figure(), PillowWriter(FRAME_RATE)
+        with writer.saving(figure, path, ANIMATION_DPI):
             for i in track(frames, "animation", len(frames)):
                 axes.clear()
                 self.draw(axes, i)
                 writer.grab_frame()
 
-    def _width(self, stress):
+    @style()
+    def estimate_time(self, frames: int) -> float:
+        """Estimate the time (s) to draw `final` and an `animation` of a run of so many frames, by
+        drawing the first frame."""
+        figure, axes = self.figure()
+        figure.set_dpi(ANIMATION_DPI)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        started = time.perf_counter()
+        axes.clear()
+        self.draw(axes, 0)
+        canvas.draw()
+        frame_time = time.perf_counter() - started
+        return (min(frames, MAX_FRAMES) + FINAL_COST) * frame_time
+
+    def _line_width(self, stress):
         """Line width (points) of a normal stress (Pa)."""
-        return 0.7 + 2.0 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
+        minimum, growth, limit = LINE_WIDTHS
+        return minimum + growth * np.clip(np.asarray(stress) / self.stress, 0, limit)
 
 
 @style()
-def curves(record: Record, path: Path) -> None:
-    """Stress and dilation of the sheared joints against sliding, and of the law alone."""
+def curves(record: RunRecord, path: Path) -> None:
+    """Draw stress and dilation of the sheared joints against slip, and those of the law alone."""
     figure = Figure(figsize=(7, 7))
     upper, lower = figure.subplots(2, sharex=True)
     for moving, base in record.scene.shear:
         name = record.scene.blocks[moving].name
-        slid, closure, stress, tau = (
-            record.column(f"{name}: {key}")
-            for key in ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
+        slip, closure, normal, shear = (
+            record.series(f"{name}: {key}")
+            for key in ("slip_m", "closure_m", "normal_Pa", "shear_Pa")
         )
-        unit, told = pressure(float(stress.max()))
-        upper.plot(1e3 * slid, unit * tau, label=escape_math(f"{name} (blocks)"))
-        lower.plot(1e3 * slid, 1e3 * (closure[0] - closure))
-        law = record.scene.laws[record.laws[moving, base]]
-        if alone := shear_curve(law, float(stress[0]), slid):
-            dots, label = {"color": "k", "ls": ":"}, "law alone, at the normal stress of the start"
-            upper.plot(1e3 * alone.shear_2, unit * alone.F2, label=label, **dots)
+        factor, unit = stress_unit(float(normal.max()))
+        upper.plot(1e3 * slip, factor * shear, label=escape_math(f"{name} (blocks)"))
+        lower.plot(1e3 * slip, 1e3 * (closure[0] - closure))
+        law = record.scene.laws[record.joint_laws[moving, base]]
+        if alone := shear_curve(law, float(normal[0]), slip):
+            dots = {"color": "k", "ls": ":"}
+            label = "law alone, at the normal stress of the start"
+            upper.plot(1e3 * alone.shear_2, factor * alone.F2, label=label, **dots)
             lower.plot(1e3 * alone.shear_2, 1e3 * (alone.closure[0] - alone.closure), **dots)
-    upper.set(title=escape_math(record.scene.title), ylabel=f"shear stress ({told})")
-    lower.set(ylabel="dilation since seating (mm)", xlabel="shear displacement (mm)")
+    upper.set(title=escape_math(record.scene.title), ylabel=f"shear stress ({unit})")
+    lower.set(ylabel="dilation since the start (mm)", xlabel="shear displacement (mm)")
     figure.legend(loc="outside lower center", ncols=3)
     written(figure, path)

@@ -1,7 +1,7 @@
-"""The history of a run, in memory and as files; and what became of each rock mass."""
+"""The history of a run, in memory and as tables; and the outcome of each rock mass."""
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,187 +9,281 @@ import numpy as np
 from ..dynamics.energy_balance import ENERGIES
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, median_size
-from .monitors import base_of, law_between, readings, watched_slips
+from .monitors import base_displacement, law_between, read_monitors, start_slip_monitors
 
-FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
-CREEP, LOOK_BACK = 1e-6, 1.0  # m/s: faster is not at rest; s over which it is measured
-TOLD = 12  # most blocks that a sentence names
+FAILURE_DISPLACEMENT = 0.1  # of the median size of a rock's blocks
+CREEP_RATE = 1e-6  # m/s: slower blocks are at rest
+CREEP_INTERVAL = 1.0  # s over which the creep rate is measured
+MAX_LISTED_BLOCKS = 12
 
 
-class Record:
-    """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that were taken away, energies
-    (f, 9), joints.
+class RunRecord:
+    """The history of a run, frame by frame.
 
-    joints[f]: by name, "who" (k, 2) the two blocks; "ends" (k, 2, 2) the segment of joint that a
-    contact carries; "law" (k,) its number in the scene; and numbers (k,) with their unit in the
-    name. stresses[f] (3, n): xx, yy, xy of the blocks (Pa). monitored[f]: readings of
-    [monitor]; slips: of its joints; laws: of these joints; state: of the last frame, to return to;
-    steps: of the run; loose (n,): blocks that nothing held at step 0; initial (6, n):
-    motion there, also of a run that is resumed.
+    times (f,) in s. motion[f] (6, n): x, y (m), angle (rad) and their rates; NaN for removed
+    blocks. energy[f] (9,): energies (J) and relative energy error. joints[f]: columns by name:
+    "blocks" (k, 2), "ends" (k, 2, 2) of the segment of joint that a contact carries (m), "law" (k,)
+    its number in the scene, and numbers (k,) with their unit in the name. stresses[f] (3, n): xx,
+    yy, xy of the blocks (Pa). readings[f]: of `[monitor]`.
+
+    slips: entries of monitored slips; joint_laws: laws of monitored joints; last_state: state of
+    the last frame; steps: of the run until then; unstable (n,): blocks without static equilibrium
+    at step 0; initial (6, n): motion at step 0, also of a run that is resumed.
     """
 
     def __init__(self, sim: Simulation) -> None:
-        self.scene, self.slips, self.steps = sim.scene, watched_slips(sim), 0
-        self.loose, self.initial = sim.unstable, sim.initial
-        self.laws = {pair: law_between(sim, *pair) for pair in (*sim.scene.slip, *sim.scene.shear)}
-        self.times, self.motion, self.energy = [], [], []
-        self.joints, self.stresses, self.monitored = [], [], []
-        self.take(sim)
+        self.scene = sim.scene
+        self.slips = start_slip_monitors(sim)
+        self.steps = 0
+        self.unstable = sim.unstable
+        self.initial = sim.initial
+        pairs = (*sim.scene.slip, *sim.scene.shear)
+        self.joint_laws = {pair: law_between(sim, *pair) for pair in pairs}
+        self.times: list[float] = []
+        self.motion: list[np.ndarray] = []
+        self.energy: list[list[float]] = []
+        self.joints: list[dict[str, np.ndarray]] = []
+        self.stresses: list[np.ndarray] = []
+        self.readings: list[dict[str, float]] = []
+        self.add_frame(sim)
 
-    def take(self, sim: Simulation) -> None:
-        """Add the present as a frame."""
+    def add_frame(self, sim: Simulation) -> None:
+        """Record the present state as a frame."""
         self.times.append(sim.time)
         self.motion.append(np.where(sim.blocks.is_removed, np.nan, sim.blocks.motion))
         self.energy.append([*sim.energy_balance.energy.tolist(), sim.energy_balance.error])
-        self.joints.append(_joints(sim))
+        self.joints.append(_read_joints(sim))
         self.stresses.append(block_stresses(sim))
-        self.monitored.append(readings(sim))
-        self.state = sim.state()
+        self.readings.append(read_monitors(sim))
+        self.last_state = sim.state()
 
-    def displaced(self, i: int) -> np.ndarray:
+    def displacements(self, i: int) -> np.ndarray:
         """Displacements (n, 2) from step 0 to frame i, relative to the base (m)."""
-        base = base_of(self.scene, self.motion[i]) - base_of(self.scene, self.initial)
-        return (self.motion[i][:2] - self.initial[:2]).T - base[:2]
+        motion = self.motion[i]
+        base = base_displacement(self.scene, motion) - base_displacement(self.scene, self.initial)
+        return (motion[:2] - self.initial[:2]).T - base[:2]
 
     @property
-    def moved(self) -> np.ndarray:
-        """Distance (n,) that the blocks have moved since step 0 (m)."""
-        return np.hypot(*self.displaced(-1).T)
+    def distances(self) -> np.ndarray:
+        """Length (n,) of the displacements from step 0 to the last frame (m)."""
+        return np.hypot(*self.displacements(-1).T)
 
-    def column(self, name: str) -> np.ndarray:
-        """A monitored quantity over all frames."""
-        return np.array([row[name] for row in self.monitored])
+    def series(self, name: str) -> np.ndarray:
+        """Reading of a monitor in all frames (f,)."""
+        return np.array([reading[name] for reading in self.readings])
 
-    def write(self, path: Path) -> None:
-        """history.csv: times, energies and what the scene's [monitor] asks for."""
-        header = ["time_s", *(f"{c}_J" for c in ENERGIES), "energy_error", *self.monitored[0]]
-        rows = zip(self.times, self.energy, self.monitored, strict=True)
-        write_csv(path, header, ([t, *e, *w.values()] for t, e, w in rows))
+    def write_history(self, path: Path) -> None:
+        """Write history.csv: times, energies and readings of the monitors."""
+        energies = [f"{column}_J" for column in ENERGIES]
+        header = ["time_s", *energies, "energy_error", *self.readings[0]]
+        rows = zip(self.times, self.energy, self.readings, strict=True)
+        write_csv(path, header, ([t, *e, *reading.values()] for t, e, reading in rows))
 
     def write_blocks(self, path: Path) -> None:
-        """blocks.csv: where each block is at the end, and how it moved since step 0."""
-        last, away = self.motion[-1].T, self.displaced(-1)
-        slip, joints = np.zeros(len(last)), self.joints[-1]
-        np.maximum.at(slip, joints["who"], np.abs(joints["shear_m"])[:, None])
+        """Write blocks.csv: position of each block at the end, and its motion since step 0."""
+        motion = self.motion[-1].T
+        displacement = self.displacements(-1)
+        joints = self.joints[-1]
+        largest_slip = np.zeros(len(motion))
+        np.maximum.at(largest_slip, joints["blocks"], np.abs(joints["shear_m"])[:, None])
         columns = {
-            "block": [block.name for block in self.scene.blocks], "x_m": last[:, 0],
-            "y_m": last[:, 1], "displacement_m": np.hypot(*away.T), "displacement_x_m": away[:, 0],
-            "displacement_y_m": away[:, 1],
-            "rotation_deg": np.degrees(last[:, 2] - self.initial[2]),
-            "speed_m/s": np.hypot(*last[:, 3:5].T), "largest_joint_slip_m": slip,
-            "loose_at_start": self.loose.astype(int),
-        }  # fmt: skip
+            "block": [block.name for block in self.scene.blocks],
+            "x_m": motion[:, 0],
+            "y_m": motion[:, 1],
+            "displacement_m": np.hypot(*displacement.T),
+            "displacement_x_m": displacement[:, 0],
+            "displacement_y_m": displacement[:, 1],
+            "rotation_deg": np.degrees(motion[:, 2] - self.initial[2]),
+            "speed_m/s": np.hypot(*motion[:, 3:5].T),
+            "largest_joint_slip_m": largest_slip,
+            "unstable_at_start": self.unstable.astype(int),
+        }
         write_csv(path, columns, zip(*columns.values(), strict=True))
 
 
-def named(scene: Scene, which: np.ndarray) -> list[dict]:
-    """The blocks of a mask (n,): names and centroids as drawn (m)."""
-    return [dict(zip(("block", "x_m", "y_m"), (block.name, *block.centroid.tolist()), strict=True))
-            for block, meant in zip(scene.blocks, which, strict=True) if meant]  # fmt: skip
+def list_blocks(scene: Scene, mask: np.ndarray) -> list[dict]:
+    """List names and centroids as drawn (m) of the blocks of a mask (n,)."""
+    listed = []
+    for block, is_listed in zip(scene.blocks, mask, strict=True):
+        if is_listed:
+            x, y = block.centroid.tolist()
+            listed.append({"block": block.name, "x_m": x, "y_m": y})
+    return listed
 
 
-def told(blocks: list[dict]) -> str:
-    """Names and centroids of some blocks, for a person."""
-    said = [f"{one['block']} ({one['x_m']:.2f}, {one['y_m']:.2f})" for one in blocks[:TOLD]]
-    return ", ".join(said + [f"and {len(blocks) - TOLD} more"] * (len(blocks) > TOLD)) or "none"
+def format_blocks(blocks: list[dict]) -> str:
+    """Format names and centroids of some blocks for the terminal, "none" without blocks."""
+    parts = [
+        f"{block['block']} ({block['x_m']:.2f}, {block['y_m']:.2f})"
+        for block in blocks[:MAX_LISTED_BLOCKS]
+    ]
+    if len(blocks) > MAX_LISTED_BLOCKS:
+        parts.append(f"and {len(blocks) - MAX_LISTED_BLOCKS} more")
+    return ", ".join(parts) or "none"
 
 
-def _joints(sim: Simulation) -> dict[str, np.ndarray]:
-    """Joints that touch or almost touch."""
-    c, joints = sim.contacts, sim.joints
-    # The segment: what each side of the corner carries of it, the rest half and half.
-    part = c.overlap_length + 0.5 * (c.length - c.overlap_length.sum(axis=0))
-    ahead = part[0] / np.maximum(part.sum(axis=0), 1e-300)
-    ends = c.position + np.stack([ahead, ahead - 1], axis=0) * c.length * c.edge_direction
+def _read_joints(sim: Simulation) -> dict[str, np.ndarray]:
+    """Return the columns of `RunRecord.joints` for joints that touch or almost touch."""
+    contacts, joints = sim.contacts, sim.joints
+    # A contact carries a part of the joint on each side of its corner; a length that neither side
+    # carries is shared equally.
+    part = contacts.overlap_length + 0.5 * (contacts.length - contacts.overlap_length.sum(axis=0))
+    forward = part[0] / np.maximum(part.sum(axis=0), 1e-300)
+    offsets = np.stack([forward, forward - 1], axis=0) * contacts.length * contacts.edge_direction
+    ends = contacts.position + offsets
     ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
     columns = {
-        "who": np.column_stack([c.block_a, c.block_b]), "ends": ends, "law": sim.manager.law,
-        "closure_m": c.closure, "shear_m": joints.delta[:, 1],
-        "normal_stress_Pa": joints.traction[:, 0], "shear_stress_Pa": joints.traction[:, 1],
-        "sliding": joints.sliding, "slipping": joints.slipping, "separated": joints.separated,
-        "length_m": c.length, "sliding_m/s": c.sliding_rate,
-    }  # fmt: skip
-    return {name: column[c.length > 0] for name, column in columns.items()}
+        "blocks": np.column_stack([contacts.block_a, contacts.block_b]),
+        "ends": ends,
+        "law": sim.manager.law,
+        "closure_m": contacts.closure,
+        "shear_m": joints.delta[:, 1],
+        "normal_stress_Pa": joints.traction[:, 0],
+        "shear_stress_Pa": joints.traction[:, 1],
+        "sliding": joints.sliding,
+        "slipping": joints.slipping,
+        "separated": joints.separated,
+        "length_m": contacts.length,
+        "slip_rate_m/s": contacts.sliding_rate,
+    }
+    return {name: column[contacts.length > 0] for name, column in columns.items()}
 
 
 def block_stresses(sim: Simulation) -> np.ndarray:
-    """Mean stress xx, yy, xy (3, n) in each block (Pa, compression positive): force times arm of
-    its joints, over its volume. NaN where other forces hold or load a block."""
-    c, blocks = sim.contacts, sim.scene.blocks
-    push, shear = (sim.joints.traction * c.length[:, None]).T
-    on_b, block = (push + 1j * shear) * c.normal, np.concatenate([c.block_a, c.block_b])
-    fx, fy = (part := np.concatenate([on_b, -on_b])).real, part.imag
-    arm = np.tile(c.position, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
-    parts = fx * arm.real, fy * arm.imag, 0.5 * (fx * arm.imag + fy * arm.real)
-    sums = np.array([np.bincount(block, part, len(blocks)) for part in parts])
-    other = np.array([block.fixed or bool(block.prescribed) for block in blocks])
+    """Mean stress xx, yy, xy (3, n) in each block (Pa, compression positive).
+
+    It is the sum of contact force times arm over the volume of the block. NaN for blocks that other
+    forces act on: fixed and driven ones, and blocks that in-situ stress loads from outside.
+    """
+    contacts, blocks = sim.contacts, sim.scene.blocks
+    normal, shear = (sim.joints.traction * contacts.length[:, None]).T
+    force_on_b = (normal + 1j * shear) * contacts.normal
+    force = np.concatenate([force_on_b, -force_on_b])
+    block = np.concatenate([contacts.block_a, contacts.block_b])
+    centroid = (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
+    arm = np.tile(contacts.position, 2) - centroid
+    xx = force.real * arm.real
+    yy = force.imag * arm.imag
+    xy = 0.5 * (force.real * arm.imag + force.imag * arm.real)
+    sums = np.array([np.bincount(block, product, len(blocks)) for product in (xx, yy, xy)])
+    is_loaded = np.array([block.fixed or bool(block.prescribed) for block in blocks])
     if stress := sim.scene.in_situ:
-        other[c.outlines.block[stress.edges]] = True
-    return np.where(other, np.nan, sums / [one.section.area for one in blocks])
+        is_loaded[contacts.outlines.block[stress.edges]] = True
+    return np.where(is_loaded, np.nan, sums / [block.section.area for block in blocks])
 
 
-def write_csv(path: Path, header, rows) -> None:
-    """A table with the names of its columns."""
+def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable]) -> None:
+    """Write a table below the names of its columns."""
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(header)
         writer.writerows(rows)
 
 
-def outcomes(record: Record) -> list[dict]:
-    """One entry for each `[[rock]]` of the scene, and one for other blocks that nothing drives.
+def outcomes(record: RunRecord) -> list[dict]:
+    """Describe the outcome of each `[[rock]]` of the scene, and of all other free blocks.
 
-    Displacements are relative to the base. settled_m: largest from the drawing to step 0;
-    moved_m: largest since then; failed: blocks that moved more than failed_beyond_m;
-    creep_m_per_s: largest mean speed over the last second (or the whole run, if shorter).
+    `state`: "failed" if a block has moved by more than `failure_displacement_m`, a tenth of the
+    median block size; "stable" if no block creeps, otherwise "displacing". In a test whose drives
+    displace blocks, such as a tilt test, large displacements are no failure: "at rest" or
+    "displacing". `displacement_m`: largest displacement since step 0, relative to the base;
+    `settlement_m`: largest displacement from the scene as drawn to step 0; `failed_blocks`: number
+    of blocks beyond the failure displacement; `creep_m_per_s`: largest mean speed over the last
+    second (or the whole run, if shorter).
     """
-    out, times = [], np.array(record.times)
-    since = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
-    before = max(min(since, len(times) - 2), 0)
-    then, last = (record.displaced(i) for i in (before, -1))
-    crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
-    groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks
-    drawn = [block.centroid + base_of(record.scene, record.initial)[:2] for block in blocks]
-    settled = np.hypot(*(record.initial[:2].T - drawn).T)
-    rest = {i for i, block in enumerate(blocks) if not (block.fixed or block.prescribed)}
-    groups |= {"other blocks" if groups else "blocks": sorted(rest.difference(*groups.values()))}
-    for name, group in groups.items():
-        free = [i for i in group if np.isfinite(last[i, 0])]
+    scene = record.scene
+    blocks = scene.blocks
+    distances = record.distances
+    creep_rates = _creep_rates(record)
+    drawn = base_displacement(scene, record.initial)[:2]
+    centroids = [block.centroid + drawn for block in blocks]
+    settlements = np.hypot(*(record.initial[:2].T - centroids).T)
+    entries = []
+    for name, group in _groups(scene).items():
+        free = [i for i in group if np.isfinite(distances[i])]
         if not free:
             continue
-        moved, creep = record.moved[free], float(crept[free].max())
-        limit = FAILED * median_size(blocks[i] for i in free)
-        failed = int((moved > limit).sum())
-        out.append(
+        creep = float(creep_rates[free].max())
+        limit = FAILURE_DISPLACEMENT * median_size(blocks[i] for i in free)
+        failed_blocks = int((distances[free] > limit).sum())
+        is_test = not scene.rocks and _displaces_blocks(scene)
+        entries.append(
             {
                 "rock": name,
-                "state": "fails" if failed else "stands" if creep < CREEP else "moves",
+                "state": _state(failed_blocks, creep, is_test),
                 "blocks": len(free),
-                "settled_m": float(settled[free].max()),
-                "moved_m": float(moved.max()),
-                "failed": failed,
-                "failed_beyond_m": limit,
+                "settlement_m": float(settlements[free].max()),
+                "displacement_m": float(distances[free].max()),
+                "failed_blocks": failed_blocks,
+                "failure_displacement_m": limit,
                 "creep_m_per_s": creep,
             }
         )
-    return out
+    return entries
 
 
-def sentences(record: Record) -> Iterator[str]:
-    """What a person wants to know at the end: a line for each watched slip and each rock."""
+def _creep_rates(record: RunRecord) -> np.ndarray:
+    """Mean speed (n,) of each block over the last CREEP_INTERVAL (m/s)."""
+    times = np.array(record.times)
+    first = int(np.searchsorted(times, times[-1] - CREEP_INTERVAL + 1e-9))
+    first = max(min(first, len(times) - 2), 0)
+    change = record.displacements(-1) - record.displacements(first)
+    return np.hypot(*change.T) / max(times[-1] - times[first], 1e-300)
+
+
+def _groups(scene: Scene) -> dict[str, list[int]]:
+    """Numbers of the free blocks of each rock, and of all other free blocks, by name."""
+    groups = {rock.name: rock.free for rock in scene.rocks}
+    free = {i for i, block in enumerate(scene.blocks) if not (block.fixed or block.prescribed)}
+    others = sorted(free.difference(*groups.values()))
+    groups["other blocks" if groups else "blocks"] = others
+    return groups
+
+
+def _displaces_blocks(scene: Scene) -> bool:
+    """Whether a drive moves blocks of a scene."""
+    return any(len(drive.times) > 1 for drive in scene.drives)
+
+
+def _state(failed_blocks: int, creep: float, is_test: bool) -> str:
+    """The `state` of an outcome."""
+    if failed_blocks and not is_test:
+        return "failed"
+    if creep >= CREEP_RATE:
+        return "displacing"
+    return "at rest" if is_test else "stable"
+
+
+def report_lines(record: RunRecord) -> Iterator[str]:
+    """Yield a line for each monitored slip and for each outcome, for the terminal."""
     for slip in record.slips.values():
-        angle, alone = slip["slip_angle"], slip["predicted_angle"]
-        said = f"slipped at {angle:.2f} degrees" if angle is not None else "no slip"
-        said = "had slipped before this run" if slip["slipped_before"] else said
-        law = "nothing" if alone is None else f"{alone:.2f} degrees"
-        yield f"{slip['block']}: {said}, the law alone says {law}"
-    yield from map(sentence, outcomes(record))
+        yield format_slip(slip, record)
+    yield from map(format_outcome, outcomes(record))
 
 
-def sentence(entry: dict) -> str:
-    """One line for a person."""
+def format_slip(slip: dict, record: RunRecord) -> str:
+    """Format a monitored slip for the terminal."""
+    if slip["slipped_before"]:
+        event = "had slipped before this run"
+    elif slip["slip_angle"] is None:
+        event = "no slip"
+    else:
+        event = f"slipped at {slip['slip_angle']:.2f} degrees"
+    predicted = slip["predicted_angle"]
+    prediction = "" if predicted is None else f", the law alone predicts {predicted:.2f} degrees"
+    total = abs(record.readings[-1][f"{slip['block']}: slip_m"])
+    return f"{slip['block']}: {event}{prediction}; slip {total:.2g} m"
+
+
+def format_outcome(entry: dict) -> str:
+    """Format an outcome for the terminal."""
+    displacement = f"largest displacement {entry['displacement_m']:.2g} m"
+    creep = f"creep {entry['creep_m_per_s']:.1e} m/s"
+    if entry["state"] == "at rest":
+        return f"{entry['rock']}: at rest; {displacement}"
+    if entry["state"] == "stable":
+        return f"{entry['rock']}: stable; {displacement}, {creep}"
     return (
-        f"{entry['rock']}: {entry['state']}; {entry['failed']} of {entry['blocks']} blocks moved "
-        f"more than {entry['failed_beyond_m']:.2g} m, the farthest {entry['moved_m']:.2g} m; "
-        f"creep {entry['creep_m_per_s']:.1e} m/s"
+        f"{entry['rock']}: {entry['state']}; {entry['failed_blocks']} of {entry['blocks']} blocks "
+        f"displaced by more than {entry['failure_displacement_m']:.2g} m, {displacement}, {creep}"
     )

@@ -1,4 +1,4 @@
-"""Run a scene to its end and write what a user wants to see."""
+"""Run a scene to its end, and write its files."""
 
 import sys
 import time
@@ -9,147 +9,174 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from jointlaw.support.files import write_json
+from jointlaw.support.files import SUMMARY, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy_balance import ENERGIES
 from ..dynamics.simulation import Simulation, require_text
 from ..scene import Scene, SceneError, median_size
-from .folder import BLOCKS, HISTORY, clear_run
-from .monitors import look
+from .folder import BLOCKS, HISTORY, LAST_VALID_STATE, STATE, clear_run
+from .monitors import update_slip_monitors
 from .pictures import Pictures, curves
-from .record import Record, named, outcomes
+from .record import RunRecord, list_blocks, outcomes
 
-MOST_STEPS = 1e8  # of a run: days for a hundred blocks
-LOOKS = 8  # steps between two looks for slip
-VERSION = 2  # of summary.json
+MAX_STEPS = 1e8  # of a run: days for a hundred blocks
+SLIP_CHECK_INTERVAL = 8  # steps
+SUMMARY_VERSION = 3
 
 
 def run(
     sim: Simulation, folder: Path | None = None, until: float | None = None,
     pictures: str | None = FORMATS[0], vtk: bool = False,
-):  # fmt: skip
-    """Run to `until` (s, default the scene's end); writes into `folder` if given.
+) -> tuple[RunRecord, dict]:  # fmt: skip
+    """Run a simulation, and write its files into a folder.
 
-    pictures: their format, None for none; vtk: VTK files too, which needs meshio.
-    Returns (record, summary). A state that the method cannot carry raises SceneError, Ctrl-C raises
-    KeyboardInterrupt; before, all is written up to the last frame, and the state of then into
-    `folder`/refused or `folder`/state, from where the run can be resumed. Results of another run in
-    `folder` are replaced whole. Raises ValueError, before the first step, for an `until` that
-    cannot be reached and for a scene that cannot be saved.
+    folder: for the files, None to write none; results of another run in it are replaced. until:
+    model time (s), by default the end of the scene. pictures: their format, None for no pictures.
+    vtk: whether to write VTK files too, which needs meshio.
+
+    Returns record and summary. Raises SceneError for a state that the method cannot continue from,
+    and KeyboardInterrupt for Ctrl-C; before, all files are written up to the last frame, and its
+    state into `folder`/last_valid_state or `folder`/state, from where the run can be resumed.
+    Raises ValueError, before the first step, for an `until` that cannot be reached and for a scene
+    that cannot be saved.
     """
     steps_to(sim, until)
     if folder:
         require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
-    started, record = time.perf_counter(), Record(sim)
+    started = time.perf_counter()
+    record = RunRecord(sim)
     stopped: BaseException | None = None
     try:
-        play(sim, record, until)
+        advance(sim, record, until)
     except (SceneError, KeyboardInterrupt) as error:
         stopped = error
-    summary = {
-        "version": VERSION,
+    summary = summarise(sim, record, stopped)
+    summary["wall_time_s"] = time.perf_counter() - started
+    message = summary["stopped"]
+    if folder:
+        state = folder / (LAST_VALID_STATE if isinstance(stopped, SceneError) else STATE)
+        clear_run(folder)
+        sim.save(state, record.last_state)
+        write(record, summary, folder, pictures, vtk)
+        message = (
+            f"{message}; resume from {record.times[-1]:.4g} s of model time: "
+            f"python -m dem_demo resume {state} --out NEW"
+        )
+    if stopped:
+        raise type(stopped)(message) from None
+    return record, summary
+
+
+def summarise(sim: Simulation, record: RunRecord, stopped: BaseException | None = None) -> dict:
+    """Return the content of summary.json (docs/blocks.md). stopped: the error that ended the run,
+    if any."""
+    start_times = sim.stage_start_times.tolist()
+    return {
+        "version": SUMMARY_VERSION,
         "scene": sim.scene.title,
         "model_time_s": record.times[-1],
         "steps": record.steps,
         "time_step_s": sim.dt,
-        "step_limit_s": sim.limit.lowest,
+        "time_step_limit_s": sim.limit.lowest,
         "time_step_margin": sim.limit.lowest / sim.dt,
-        "started_in_equilibrium": not record.loose.any(),
-        "loose": named(sim.scene, record.loose),
-        "law_points": sim.joints.n,
-        "stresses_of_joints": "effective" if sim.scene.wet else "total",
-        "stages_begun_s": [
-            time if time < np.inf else None for time in sim.stage_start_times.tolist()
-        ],
+        "started_in_equilibrium": not record.unstable.any(),
+        "unstable": list_blocks(sim.scene, record.unstable),
+        "contact_points": sim.joints.n,
+        "joint_stresses": "effective" if sim.scene.wet else "total",
+        "stage_start_s": [start if start < np.inf else None for start in start_times],
         "energy_J": dict(zip(ENERGIES, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
-        "largest_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),
+        "max_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),
         "slip": list(record.slips.values()),
         "rocks": outcomes(record),
-        "wall_time_s": time.perf_counter() - started,
         "stopped": stopped and (str(stopped) or "interrupted"),
     }
-    told = summary["stopped"]
-    if folder:
-        place = folder / ("refused" if isinstance(stopped, SceneError) else "state")
-        clear_run(folder)
-        sim.save(place, record.state)
-        write(record, summary, folder, pictures, vtk)
-        told = (
-            f"{summary['stopped']}; go on from {record.times[-1]:.4g} s of model time: "
-            f"python -m dem_demo resume {place} --out NEW"
-        )
-    if stopped:
-        raise type(stopped)(told) from None
-    return record, summary
 
 
-def play(
+def advance(
     sim: Simulation,
-    record: Record,
+    record: RunRecord,
     until: float | None = None,
-    stop: Callable[[Record], bool] = lambda record: False,
+    stop: Callable[[RunRecord], bool] = lambda record: False,
 ) -> None:
-    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises SceneError."""
-    left, taken, dt = steps_to(sim, until), 0, 0.0
-    with tqdm(total=left, desc=sim.scene.title, disable=not sys.stderr.isatty()) as bar:
-        while left:
+    """Step to a model time (s), or until `stop` of a new frame is true, recording on the way.
+
+    Raises SceneError for a state that the method cannot continue from.
+    """
+    remaining = steps_to(sim, until)
+    taken = 0
+    dt = 0.0
+    with tqdm(total=remaining, desc=sim.scene.title, disable=not sys.stderr.isatty()) as bar:
+        while remaining:
             if sim.dt != dt:  # at the start, and where the time step was halved
-                dt, done, left = sim.dt, 0, steps_to(sim, until)
-                every = max(round(min(sim.scene.run.record / dt, left + 1)), 1)
-                bar.reset(left)
+                dt = sim.dt
+                since_change = 0
+                remaining = steps_to(sim, until)
+                interval = max(round(min(sim.scene.run.record / dt, remaining + 1)), 1)
+                bar.reset(remaining)
             sim.step()
-            taken, done, left = taken + 1, done + 1, left - 1
+            taken += 1
+            since_change += 1
+            remaining -= 1
             bar.update()
-            if done % LOOKS == 0:
-                look(record.slips, sim)
-            if done % every == 0 or left == 0:
-                record.take(sim)
+            if since_change % SLIP_CHECK_INTERVAL == 0:
+                update_slip_monitors(record.slips, sim)
+            if since_change % interval == 0 or remaining == 0:
+                record.add_frame(sim)
                 record.steps = taken
                 if stop(record):
                     break
 
 
-def to_failure(scene: Scene, until: float | None) -> tuple[Record, str]:
-    """A run to `until` (s, default the scene's end), or until a block has moved by the usual size
-    of a block; and why it was refused, if it was: what is recorded by then is kept."""
-    sim, size = Simulation(scene), median_size(block for block in scene.blocks if not block.fixed)
-    record, refused = Record(sim), ""
+def run_to_failure(scene: Scene, until: float | None) -> tuple[RunRecord, str]:
+    """Run to a model time (s), or until a block has moved by the median size of a block.
+
+    Returns the record, and the message of a SceneError that ended the run, empty without one.
+    """
+    sim = Simulation(scene)
+    size = median_size(block for block in scene.blocks if not block.fixed)
+    record = RunRecord(sim)
+    message = ""
     try:
-        play(sim, record, until, lambda record: bool(np.nanmax(record.moved) > size))
+        advance(sim, record, until, lambda record: bool(np.nanmax(record.distances) > size))
     except SceneError as error:
-        refused = str(error)
-    return record, refused
+        message = str(error)
+    return record, message
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
-    """Steps from now to a model time (s), by default the scene's end: none if that is past.
+    """Number of steps to a model time (s), by default to the scene's end; zero if that is past.
 
-    Raises ValueError for a time given that is past, not finite, or out of reach.
+    Raises ValueError for a given time that is past, not finite, or more than MAX_STEPS away.
     """
     now, dt = sim.time, sim.dt
     end = max(sim.scene.run.end, now) if until is None else until
     steps = (end - now) / dt
-    if not -0.5 <= steps <= MOST_STEPS:
+    if not -0.5 <= steps <= MAX_STEPS:
         raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "
-                         f"must be from 0 to {MOST_STEPS:g}; units?")  # fmt: skip
+                         f"must be from 0 to {MAX_STEPS:g}; units?")  # fmt: skip
     return round(steps)
 
 
-def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: bool) -> None:
-    """All files of a run: numbers before pictures, which take longest; drawn: their format."""
-    pictures: dict[str, Callable[[Path], None]] = {}
-    if drawn:
-        of = Pictures(record)
-        pictures = {f"final.{drawn}": of.final, "motion.gif": of.animation}
+def write(
+    record: RunRecord, summary: dict, folder: Path, picture_format: str | None, vtk: bool
+) -> None:
+    """Write all files of a run: tables before pictures, which take longest.
+
+    picture_format: None for no pictures; vtk: whether to write VTK files.
+    """
+    drawings: dict[str, Callable[[Path], None]] = {}
+    if picture_format:
+        pictures = Pictures(record)
+        drawings = {f"final.{picture_format}": pictures.final, "motion.gif": pictures.animation}
         if record.scene.shear:
-            pictures[f"curves.{drawn}"] = partial(curves, record)
-    write_json(folder / "summary.json", {**summary, "files": [HISTORY, BLOCKS, *pictures]})
-    record.write(folder / HISTORY)
+            drawings[f"curves.{picture_format}"] = partial(curves, record)
+    write_json(folder / SUMMARY, {**summary, "files": [HISTORY, BLOCKS, *drawings]})
+    record.write_history(folder / HISTORY)
     record.write_blocks(folder / BLOCKS)
-    for name, draw in pictures.items():
+    for name, draw in drawings.items():
         draw(folder / name)
     if vtk:
         from .vtk import write as write_vtk  # loads meshio

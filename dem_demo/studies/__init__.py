@@ -1,6 +1,7 @@
 """Studies: many runs of one scene.
 
-compare    every rock alone, for several seeds, with plain Coulomb as well
-strength   the factor of safety, the critical tilt, and how a scene fails
-ablate     a scene without each of its ingredients: what that changes
+compare           every rock alone, for several seeds, with its own laws and with Coulomb's law
+strength          factor of safety, critical tilt, and a run to failure
+limit_analysis    an upper bound of the factor of safety
+ablate            a scene without each of its ingredients: changes of the results, and of the cost
 """

@@ -1,8 +1,9 @@
-"""How far a scene is from failing: its factor of safety and its critical tilt.
+"""Factor of safety and critical tilt of a scene, and how it fails.
 
-Both are looked for on the initial equilibrium, without running the blocks: a scene fails where no
-displacements are found with which the joints carry the loads. A search starts where the scene
-holds, and looks for every equilibrium from the one before, with shorter steps where none is found.
+Both are searched on the initial equilibrium, without running the blocks: a scene fails where no
+displacements are found with which the joints carry the loads. A search starts at a parameter for
+which the scene is stable, and takes every equilibrium as the initial guess of the next one, with
+shorter steps where none is found.
 """
 
 import json
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
@@ -21,167 +22,211 @@ from jointlaw.support.files import write_json
 
 from ..dynamics.equilibrium import equilibrium_displacements
 from ..dynamics.simulation import Simulation
+from ..output.folder import TRIALS
 from ..output.pictures import Pictures
-from ..output.record import named, told
-from ..output.run import to_failure
+from ..output.record import format_blocks, list_blocks
+from ..output.run import run_to_failure
 from ..scene import Scene, Tables, build, median_size, read_tables, rotation
 from .limit_analysis import limit_factor
 
-FILE, VERSION = "trials.json", 2
-TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
-FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
-TWICE = 2.0  # where all blocks are loose: times the strength, with which fewer are
-FIRST = 0.01  # of the usual size of a block: who has moved by half of the most then moves first
-BELOW_BOUND = 0.06  # first step of a search below a bound, of the logarithm
+TRIALS_VERSION = 4
+STRENGTHENED = 2.0  # times the strength, to find blocks that strength does not stabilise
+INITIATION_DISPLACEMENT = 0.01  # of the median size of a block: initiating blocks are found then
+INITIATING_FRACTION = 0.5  # of the largest displacement: initiating blocks have moved more
+SHOWN_REDUCTION = 1.02  # times the factor of safety: strength reduction of the failing run
+
+
+class SearchRange(NamedTuple):
+    """Range of a search: its first step, the largest absolute value, and the tolerance."""
+
+    step: float
+    largest: float
+    tolerance: float
+
+
+TILT = SearchRange(8.0, 60.0, 0.05)  # degrees
+LOG_FACTOR = SearchRange(np.log(2.0), np.log(64.0), 0.006)
+STEP_BELOW_BOUND = 0.06  # first step of a search below an upper bound of the logarithm
 STEP_GROWTH = 1.5  # of its further steps
-SHOWN = 1.02  # times the factor: what the strength of the failing run is divided by
 
 
 class Trials:
-    """What has been found about a scene, by name; with a `folder` also in its trials.json.
+    """Finished trials of a scene by name, kept in the file trials.json of a folder, if given.
 
     Raises ValueError for a folder with trials of another scene.
     """
 
     def __init__(self, scene: Scene, folder: Path | None = None) -> None:
-        self.path = folder and folder / FILE
-        self.of = {"version": VERSION, "scene": scene.text, "files": dict(scene.files)}
-        self.known: dict[str, Any] = {}
+        self.path = folder and folder / TRIALS
+        self.header = {
+            "version": TRIALS_VERSION,
+            "scene": scene.text,
+            "files": dict(scene.files),
+        }
+        self.results: dict[str, Any] = {}
         if self.path and self.path.exists():
-            kept = json.loads(self.path.read_text(encoding="utf-8"))
-            self.known = kept.pop("trials")
-            if kept != self.of:
+            header = json.loads(self.path.read_text(encoding="utf-8"))
+            self.results = header.pop("trials")
+            if header != self.header:
                 raise ValueError(
                     f"{self.path} holds trials of another scene: give another --out, or --force to "
                     "replace them"
                 )
 
-    def ask(self, name: str, find: Callable[[], Any]) -> Any:
-        """What `find` says; known from before, it is not asked again. Of the file arrays are
-        lists."""
-        if name not in self.known:
-            self.known[name] = find()
+    def result(self, name: str, compute: Callable[[], Any]) -> Any:
+        """Return the result of a trial, computed unless it is finished already.
+
+        Arrays that come from the file are lists.
+        """
+        if name not in self.results:
+            self.results[name] = compute()
             if self.path:
-                write_json(self.path, {**self.of, "trials": self.known})
-        return self.known[name]
+                write_json(self.path, {**self.header, "trials": self.results})
+        return self.results[name]
 
 
 def strength_reduction(
     scene: Scene, until: float, folder: Path, picture_format: str, tell: Callable[[str], None]
 ) -> Iterator[dict]:
-    """Factor of safety and critical tilt of every rock alone, or of a scene without rocks.
+    """Compute factor of safety and critical tilt of every rock alone, or of a scene without rocks.
 
-    Yields `rock`; `loose`: blocks that cannot be held as drawn, names and centroids (m);
-    `without`: the same, or where all are loose, those that twice the strength does not hold either;
-    `factor_of_safety`; with such blocks `factor_without`: of all others, while these move away;
-    `critical_tilt` (degrees); each None where none is found. `picture`: the file in `folder` that
-    shows how it fails, None without a factor; `first`: the blocks that move first there. That run
-    has the strength divided by 1.02 times the factor (without loose blocks, if there are any), and
-    ends at `until` (s) or once a block has moved by the size of a block. Each finished trial is
-    kept in the folder; called again with it, the search goes on. tell: is told what is done, a line
-    at a time.
+    until: model time (s) at which the run to failure ends, if no block has moved by the size of a
+    block before. folder: for pictures and finished trials; called again with it, the search
+    continues. tell: called with each line of progress.
+
+    Yields rows. `rock`: its name. `unstable`: names and centroids (m) of blocks without static
+    equilibrium. `excluded`: the same blocks, or if all blocks are unstable, only those that are
+    unstable with twice the strength too. `factor_of_safety`: of all blocks.
+    `factor_without_excluded`: of all other blocks, while the excluded ones move away, if some are
+    excluded. `critical_tilt` (degrees). A number is None where none is found. `picture`: name of
+    the picture of the run to failure, None without a factor; the strength of that run is divided by
+    1.02 times the factor. `initiating_blocks`: blocks that move first in it, names and centroids
+    (m).
     """
     trials = Trials(scene, folder)
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
-        one = (alone(scene, name) if scene.rocks else scene).excavated
-        tell(f"{name}: looking for blocks that cannot be held")
-        loose = trials.ask(f"{name}: loose", partial(_loose, one))
-        free = sum(not b.fixed and i not in one.removed for i, b in enumerate(one.blocks))
-        tell(f"{name}: {len(loose)} of {free} blocks cannot be held: {told(loose)}")
-        row: dict = {"rock": name, "loose": loose, "without": loose}
-        if len(loose) == free:
-            row["without"] = trials.ask(
-                f"{name}: loose with strength * {TWICE:g}",
-                partial(_loose, weakened(one, 1 / TWICE)),
-            )
-            tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength "
-                 f"neither: {told(row['without'])}")  # fmt: skip
-        apart = np.isin([block.name for block in one.blocks], [b["block"] for b in row["without"]])
-        tell(f"{name}: factor of safety of all blocks")
-        factor = row["factor_of_safety"] = factor_of_safety(one, trials, name)
-        if 0 < len(row["without"]) < free:
-            tell(f"{name}: factor of safety without those {len(row['without'])}")
-            factor = row["factor_without"] = factor_of_safety(
-                one, trials, f"{name} without loose blocks", apart
-            )
-        tell(f"{name}: critical tilt")
-        row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
-        if factor:
-            row["picture"] = f"failing-{quote(name, safe=' ')}.{picture_format}"
-            path, weak = folder / row["picture"], weakened(one, SHOWN * factor)
-            title = f"{name}: factor of safety {factor:.3g}\nwith strength / {weak.reduction:.3g}"
-            tell(f"{name}: running it with strength / {weak.reduction:.3g}")
-            row["first"] = trials.ask(
-                row["picture"],
-                partial(_show, weak, until, title, path, apart & (apart.sum() < free)),
-            )
-            tell(f"{name}: first to move: {told(row['first'])}")
-        yield row
+        rock = (alone(scene, name) if scene.rocks else scene).excavated
+        yield _reduce_rock(rock, name, trials, until, folder, picture_format, tell)
 
 
-def seated(scene: Scene) -> Scene:
-    """A scene that starts from its equilibrium, with the time step that follows: it is halved where
-    joints close too far for it."""
+def _reduce_rock(
+    scene: Scene, name: str, trials: Trials, until: float, folder: Path, picture_format: str,
+    tell: Callable[[str], None],
+) -> dict:  # fmt: skip
+    """Return the row of `strength_reduction` of a rock alone, without excavation stages."""
+    tell(f"{name}: searching unstable blocks")
+    unstable = trials.result(f"{name}: unstable", partial(_unstable_blocks, scene))
+    count = sum(not b.fixed and i not in scene.removed for i, b in enumerate(scene.blocks))
+    blocks = f": {format_blocks(unstable)}" if unstable else ""
+    tell(f"{name}: {len(unstable)} of {count} blocks are unstable{blocks}")
+    excluded = unstable
+    if len(unstable) == count:
+        stronger = weakened(scene, 1 / STRENGTHENED)
+        excluded = trials.result(
+            f"{name}: unstable at strength * {STRENGTHENED:g}", partial(_unstable_blocks, stronger)
+        )
+        blocks = f": {format_blocks(excluded)}" if excluded else ""
+        tell(f"{name}: {len(excluded)} blocks stay unstable at strength x {STRENGTHENED:g}{blocks}")
+    row: dict = {"rock": name, "unstable": unstable, "excluded": excluded}
+    names = [block["block"] for block in excluded]
+    is_excluded = np.isin([block.name for block in scene.blocks], names)
+    tell(f"{name}: factor of safety of all blocks")
+    factor = row["factor_of_safety"] = factor_of_safety(scene, trials, name)
+    if 0 < len(excluded) < count:
+        tell(f"{name}: factor of safety without {len(excluded)} unstable blocks")
+        factor = row["factor_without_excluded"] = factor_of_safety(
+            scene, trials, f"{name} without unstable blocks", is_excluded
+        )
+    else:
+        is_excluded[:] = False
+    tell(f"{name}: critical tilt")
+    row["critical_tilt"] = critical_tilt(scene, trials, name)
+    row["picture"] = None
+    if factor:
+        row["picture"] = f"failing-{quote(name, safe=' ')}.{picture_format}"
+        weak = weakened(scene, SHOWN_REDUCTION * factor)
+        title = f"{name}: factor of safety {factor:.3g}\nwith strength / {weak.reduction:.3g}"
+        tell(f"{name}: running it with strength / {weak.reduction:.3g}")
+        show = partial(_show_failure, weak, until, title, folder / row["picture"], is_excluded)
+        initiating = row["initiating_blocks"] = trials.result(row["picture"], show)
+        tell(f"{name}: initiating blocks: {format_blocks(initiating)}")
+    return row
+
+
+def settled(scene: Scene) -> Scene:
+    """Return a scene that starts in static equilibrium, with the default time step, which is halved
+    where joints stiffen."""
     return replace(scene, run=replace(scene.run, step=None, fraction=None, settle=True))
 
 
-def _loose(scene: Scene) -> list[dict]:
-    return named(scene, Simulation(seated(scene)).unstable)
+def _unstable_blocks(scene: Scene) -> list[dict]:
+    """List the blocks without static equilibrium."""
+    return list_blocks(scene, Simulation(settled(scene)).unstable)
 
 
-def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
-    """Run and draw a scene that fails; returns the blocks that move first, but for those of a mask
-    `apart` (n,)."""
-    record, _ = to_failure(seated(scene), until)
+def _show_failure(
+    scene: Scene, until: float, title: str, path: Path, is_excluded: np.ndarray
+) -> list[dict]:
+    """Run and draw a scene that fails; returns the initiating blocks, none of them excluded."""
+    record, _ = run_to_failure(settled(scene), until)
     size = median_size(block for block in scene.blocks if not block.fixed)
-    moved = [
-        np.where(apart, 0.0, np.hypot(*record.displaced(i).T)) for i in range(len(record.times))
+    distances = [
+        np.where(is_excluded, 0.0, np.hypot(*record.displacements(i).T))
+        for i in range(len(record.times))
     ]
-    away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
-    ahead = away > 0.5 * np.nanmax(away)
-    Pictures(record, title, ahead, "moves first").final(path)
-    return named(scene, ahead)
+    initiation = next(
+        (frame for frame in distances if np.nanmax(frame) > INITIATION_DISPLACEMENT * size),
+        distances[-1],
+    )
+    is_initiating = initiation > INITIATING_FRACTION * np.nanmax(initiation)
+    Pictures(record, title, is_initiating, "initiating block").final(path)
+    return list_blocks(scene, is_initiating)
 
 
 def factor_of_safety(
-    scene: Scene, trials: Trials | None = None, name: str = "scene", loose: np.ndarray | None = None
+    scene: Scene,
+    trials: Trials | None = None,
+    name: str = "scene",
+    is_excluded: np.ndarray | None = None,
 ) -> float | None:
-    """Factor by which the strength of all joints is divided at limit equilibrium, to 0.6 %.
+    """Compute the factor by which the strength of all joints is divided at limit equilibrium.
 
-    loose (n,): blocks that need not be in equilibrium.
+    Strength is the shear stress that a joint can carry at its own normal stress. Limit analysis
+    bounds the factor from above, so the search begins just below its bound; the tolerance is 0.6 %.
+    trials: finished trials, under `name`. is_excluded (n,): blocks that need no equilibrium.
 
-    Strength is the shear stress that a joint can bear at its own normal stress. Limit analysis
-    bounds the factor from above, so the search begins just below its bound. None if the scene is in
-    equilibrium with 1/64 of its strength, or has no equilibrium with 64 times of it.
+    Returns None if the scene is in equilibrium with 1/64 of its strength, or has no equilibrium
+    with 64 times of it.
     """
     trials = trials or Trials(scene)
-    limit = trials.ask(f"{name}: limit analysis", partial(limit_factor, scene, loose))
-    name = f"{name}: factor of safety"
-
-    def at(log: float) -> Scene:
-        return weakened(scene, float(np.exp(log)))
-
-    if limit == 0.0:
+    bound = trials.result(f"{name}: limit analysis", partial(limit_factor, scene, is_excluded))
+    if bound == 0.0:
         return None
-    log = (
-        _march(at, FACTOR, trials, name, loose)
-        if limit is None
-        else _search_below(at, float(np.log(limit)), FACTOR, trials, name, loose)
-    )
-    return None if log is None else float(np.exp(log))
+
+    def reduced(log_factor: float) -> Scene:
+        return weakened(scene, float(np.exp(log_factor)))
+
+    with _Search(reduced, trials, f"{name}: factor of safety", is_excluded) as search:
+        if bound is None:
+            log_factor = search.upwards(LOG_FACTOR)
+        else:
+            log_factor = search.below(float(np.log(bound)), LOG_FACTOR)
+    return None if log_factor is None else float(np.exp(log_factor))
 
 
 def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene") -> float | None:
-    """The turn of gravity (degrees, towards +x) at which a scene just holds; None beyond 60.
+    """Compute the rotation of gravity (degrees, towards +x) at limit equilibrium.
 
-    Below zero where it does not hold as drawn.
+    It is negative if the scene fails as drawn. trials: finished trials, under `name`. Returns None
+    for a tilt beyond 60 degrees.
     """
 
     def tilted(angle: float) -> Scene:
         gravity = rotation(np.radians(angle)) @ scene.gravity
         return replace(scene, gravity=tuple(gravity))
 
-    return _march(tilted, TILT, trials or Trials(scene), f"{name}: critical tilt")
+    with _Search(tilted, trials or Trials(scene), f"{name}: critical tilt") as search:
+        return search.upwards(TILT)
 
 
 def weakened(scene: Scene, factor: float) -> Scene:
@@ -196,106 +241,122 @@ def weakened(scene: Scene, factor: float) -> Scene:
     return replace(scene, laws=laws, reduction=scene.reduction * factor)
 
 
-def _march(
-    at: Callable[[float], Scene], reach: tuple[float, float, float], trials: Trials, name: str,
-    loose: np.ndarray | None = None,
-) -> float | None:  # fmt: skip
-    """Where the scenes `at` begin to fail, apart from loose blocks (n,); None if that is not
-    between -most and most.
+class _Search:
+    """Search for the parameter x beyond which the scene `scene_at(x)` has no equilibrium.
 
-    reach: the first step, `most`, and to what it is found. It starts at 0, or below at the first
-    multiple of a step that holds. From there on each equilibrium is looked for from the one before;
-    where none is found the step is halved.
+    Each trial looks for the displacements of an equilibrium, from those of a trial before it.
+    trials: finished trials, under `name`. is_excluded (n,): blocks that need no equilibrium. As a
+    context manager it shows progress.
     """
-    step, most, exact = reach
-    with _Trial(at, trials, name, loose) as find:
-        low, failed = 0.0, False
-        while (moved := find(low)) is None:
-            if low == -most:
-                return None
-            low, failed = max(low - step, -most), True
-        while not failed or step > exact:
-            high = min(low + step, most)
-            further = find(high, low, moved)
-            if further is None:
-                failed, step = True, 0.5 * step
-            elif high == most:
-                return None
-            else:
-                low, moved = high, further
-    return low + step
-
-
-def _search_below(
-    at: Callable[[float], Scene], bound: float, reach: tuple[float, float, float], trials: Trials,
-    name: str, loose: np.ndarray | None = None,
-) -> float | None:  # fmt: skip
-    """Where the scenes `at` lose their equilibrium, known to be below a bound; None below -most."""
-    _, most, exact = reach
-    high, step = bound, BELOW_BOUND
-    low = bound - step
-    with _Trial(at, trials, name, loose) as find:
-        while (moved := find(low)) is None:
-            if low <= -most:
-                return None
-            high, step = low, STEP_GROWTH * step
-            low -= step
-        while high - low > exact:
-            middle = 0.5 * (low + high)
-            further = find(middle, low, moved)
-            if further is None:
-                high = middle
-            else:
-                low, moved = middle, further
-    return 0.5 * (low + high)
-
-
-class _Trial:
-    """Finds the displacements of a trial, from those of another one, and shows progress."""
 
     def __init__(
-        self, at: Callable[[float], Scene], trials: Trials, name: str, loose: np.ndarray | None
+        self,
+        scene_at: Callable[[float], Scene],
+        trials: Trials,
+        name: str,
+        is_excluded: np.ndarray | None = None,
     ) -> None:
-        self.at, self.trials, self.name, self.loose = at, trials, name, loose
+        self.scene_at = scene_at
+        self.trials = trials
+        self.name = name
+        self.is_excluded = is_excluded
         self.bar = tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False)
 
-    def __enter__(self) -> "_Trial":
+    def __enter__(self) -> "_Search":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.bar.close()
 
-    def __call__(
-        self, x: float, last: float | None = None, guess: np.ndarray | None = None
+    def upwards(self, within: SearchRange) -> float | None:
+        """Search from x = 0 upwards, or if the scene fails there, from the first multiple of a
+        negative step at which it is stable.
+
+        The step is halved where no equilibrium is found. Returns None if x is not between
+        -`within.largest` and `within.largest`.
+        """
+        step = within.step
+        low = 0.0
+        has_failed = False
+        while (displacements := self._equilibrium(low)) is None:
+            if low == -within.largest:
+                return None
+            low = max(low - step, -within.largest)
+            has_failed = True
+        while not has_failed or step > within.tolerance:
+            high = min(low + step, within.largest)
+            further = self._equilibrium(high, low, displacements)
+            if further is None:
+                has_failed = True
+                step *= 0.5
+            elif high == within.largest:
+                return None
+            else:
+                low, displacements = high, further
+        return low + step
+
+    def below(self, bound: float, within: SearchRange) -> float | None:
+        """Search below an upper bound of x, with growing steps until an equilibrium is found, then
+        by bisection. Returns None if x is below -`within.largest`."""
+        step = STEP_BELOW_BOUND
+        high = bound
+        low = bound - step
+        while (displacements := self._equilibrium(low)) is None:
+            if low <= -within.largest:
+                return None
+            high = low
+            step *= STEP_GROWTH
+            low -= step
+        while high - low > within.tolerance:
+            middle = 0.5 * (low + high)
+            further = self._equilibrium(middle, low, displacements)
+            if further is None:
+                high = middle
+            else:
+                low, displacements = middle, further
+        return 0.5 * (low + high)
+
+    def _equilibrium(
+        self, x: float, previous: float | None = None, guess: np.ndarray | None = None
     ) -> np.ndarray | None:
-        moved = self.trials.ask(
-            f"{self.name} {x} from {last}",
-            lambda: equilibrium_displacements(self.at(x), guess, self.loose),
+        """Return the displacements of the equilibrium at x, None if none is found.
+
+        guess: displacements of the equilibrium at `previous`.
+        """
+        displacements = self.trials.result(
+            f"{self.name} {x} from {previous}",
+            lambda: equilibrium_displacements(self.scene_at(x), guess, self.is_excluded),
         )
         self.bar.update()
-        return None if moved is None else np.array(moved)
+        return None if displacements is None else np.array(displacements)
 
 
 def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
-    """One rock of a scene, cut with a seed (default its own), with nothing watched.
+    """Build the scene of one of its rocks alone, without monitors.
 
-    Of the [[joint]] tables those of this rock stay; those that name its blocks only with its own
-    seed, for with another there are other blocks.
+    seed: another seed than the rock's own. Of the `[[joint]]` tables those of this rock are kept;
+    tables that name its blocks only with its own seed, because another seed gives other blocks.
     """
     data = read_tables(scene.text)
     rock = next(table for table in data["rock"] if table["name"] == name)
-    own = {"seed": 0, **rock} | ({} if seed is None else {"seed": seed})
-    same = own["seed"] == rock.get("seed", 0)
-    blocks = {block["name"] for block in data.get("block", [])}
+    table = {"seed": 0, **rock} | ({} if seed is None else {"seed": seed})
+    has_own_seed = table["seed"] == rock.get("seed", 0)
+    other_blocks = {block["name"] for block in data.get("block", [])}
     outline = Polygon(np.add(rock["outline"], rock.get("at", [0, 0])))
 
     def belongs(joint: Tables) -> bool:
+        """Whether a `[[joint]]` table is one of this rock."""
         if around := joint.get("around"):
             return bool(outline.contains(Point(around)))
-        others = set(joint["between"]) - blocks
-        return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
+        rock_blocks = set(joint["between"]) - other_blocks
+        is_own = all(block.rpartition(" ")[0] == name for block in rock_blocks)
+        return is_own and (has_own_seed or not rock_blocks)
 
-    digs = [dig for dig in data.get("excavate", [])
-            if outline.intersection(Polygon(dig["corners"])).area > 0]  # fmt: skip
-    kept = {"joint": [*filter(belongs, data.get("joint", []))], "excavate": digs}
-    return build({**data, **kept, "rock": [own], "monitor": {}}, files=scene.files)
+    joints = [*filter(belongs, data.get("joint", []))]
+    stages = [
+        stage
+        for stage in data.get("excavate", [])
+        if outline.intersection(Polygon(stage["corners"])).area > 0
+    ]
+    parts = {"joint": joints, "excavate": stages, "rock": [table], "monitor": {}}
+    return build({**data, **parts}, files=scene.files)

@@ -39,7 +39,7 @@ def mean_slip(record):
     """Mean slip (m) of the free blocks down the slope, at each record."""
     free_blocks = record.scene.rocks[0].free
     displacements = [
-        record.displaced(i)[free_blocks].mean(axis=0) for i in range(len(record.times))
+        record.displacements(i)[free_blocks].mean(axis=0) for i in range(len(record.times))
     ]
     downslope = np.array([np.cos(DIP), -np.sin(DIP)])
     return (np.array(displacements) - displacements[0]) @ downslope

@@ -14,7 +14,7 @@ import numpy as np
 from command_line import output_folder
 
 import dem_demo
-from dem_demo.output.pictures import FIXED, outlines
+from dem_demo.output.pictures import FIXED_COLOUR, outlines
 from jointlaw.support.pyplot import style
 
 COLOURS = "#c95500", "#1f6fd0"
@@ -37,11 +37,11 @@ def main(folder):
         figure, (above, below) = plt.subplots(2, 1, figsize=(7.8, 8.0), height_ratios=(1, 1.5))
         for (slab, table), colour, title in zip(record.slips, COLOURS, TITLES, strict=True):
             name = scene.blocks[slab].name
-            slip = np.abs(record.column(f"{name}: slid_m"))
+            slip = np.abs(record.series(f"{name}: slip_m"))
             draw_slab(above, outlines(record, int(np.argmax(slip > DRAWN_SLIP))), slab, table,
                       colour, title)  # fmt: skip
             slides = is_sliding(record, name, slip)
-            ratio = record.column(f"{name}: shear_Pa") / record.column(f"{name}: normal_Pa")
+            ratio = record.series(f"{name}: shear_Pa") / record.series(f"{name}: normal_Pa")
             angle = np.degrees(np.arctan(np.abs(ratio)))
             below.semilogx(1e3 * slip[slides], angle[slides], color=colour)
             slip_angle = record.slips[slab, table]["slip_angle"]
@@ -61,7 +61,7 @@ def main(folder):
 
 def draw_slab(axes, shapes, slab, table, colour, title):
     """Draw the outlines of a slab and its table."""
-    axes.fill(*shapes[table].T, color=FIXED)
+    axes.fill(*shapes[table].T, color=FIXED_COLOUR)
     axes.fill(*shapes[slab].T, color="#efe9dc", ec=colour, lw=2)
     axes.text(shapes[table][:, 0].mean(), 3.2, title, color=colour, ha="center", va="bottom")
 
@@ -70,7 +70,7 @@ def is_sliding(record, slab, slip):
     """Whether the slab slides, for each record."""
     growth = np.diff(np.maximum.accumulate(slip), prepend=0.0)
     grows = growth > MIN_RELATIVE_GROWTH * slip + MIN_GROWTH
-    sliding_fraction = record.column(f"{slab}: sliding_share")
+    sliding_fraction = record.series(f"{slab}: sliding_fraction")
     sticks = (sliding_fraction < MIN_SLIDING_FRACTION) & (slip < STICKING_SLIP)
     return grows & ~sticks
 

@@ -51,17 +51,17 @@ fraction = 0.4
 record = 0.01
 """
 record, summary = run(Simulation(parse(SCENE)))
-print(f"{summary['steps']} steps, energy balanced to {summary['largest_energy_error']:.0e}")
+print(f"{summary['steps']} steps, energy balanced to {summary['max_energy_error']:.0e}")
 
 # %%
 # The record contains the motion of all blocks, the energies, and the joints that the scene
 # monitors. A direct shear test of the law alone, on the same path, gives the same curve: rigid
 # blocks add no compliance.
 
-slip = record.column("block: slid_m")
-shear = record.column("block: shear_Pa")
-normal = record.column("block: normal_Pa")
-closure = record.column("block: closure_m")
+slip = record.series("block: slip_m")
+shear = record.series("block: shear_Pa")
+normal = record.series("block: normal_Pa")
+closure = record.series("block: closure_m")
 law_test = jl.direct_shear(record.scene.laws["replica"].joint(), slip[1:], normal[0], steps=1)
 
 figure, (stress_axes, dilation_axes) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")

@@ -158,7 +158,7 @@ def heap(folder: Path, columns=625, rows=16, end=2.5):
         "time_step_s": summary["time_step_s"], "wall_s": round(wall_seconds),
         "cpu_s": round(cpu_seconds),
         "us_per_contact_and_step": round(1e6 * cpu_seconds / summary["steps"] / sim.joints.n, 3),
-        "energy_error": summary["largest_energy_error"],
+        "energy_error": summary["max_energy_error"],
         "median_speed_m/s": float(np.median(speed)), "fastest_m/s": float(speed.max()),
         "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
     }, indent=1))  # fmt: skip
@@ -286,7 +286,7 @@ def ablation_table():
     for path in sorted(ABLATION_FOLDER.glob("ablation-*.csv")):
         whole, *variants = read_csv(path)
         for row in variants[:-1]:  # the last is the whole scene, repeated
-            add_changes(changes[row["without"]], row, whole)
+            add_changes(changes[row["variant"]], row, whole)
     rows = [[name, *change_cells(values)] for name, values in changes.items()]
     print_table(["change", "scenes", "slip or peak angle (deg)", "work of friction",
                  "distance of the ends (mm)", "other results", "time"], rows)  # fmt: skip
@@ -341,7 +341,7 @@ def add_changes(changes, row, whole):
             changes["other results"].append(value != whole[key])
         elif key == "friction_kJ":
             changes["friction"].append(abs(float(change) / float(whole[key])))
-        elif key == "end, apart_mm":
+        elif key == "distance of the ends_mm":
             changes["distance"].append(float(value))
 
 

@@ -18,10 +18,10 @@ from scene_text import PLAIN, ROCK, block
 from scipy.sparse.linalg import ArpackNoConvergence
 
 from dem_demo import SceneError, Simulation, load, parse, run
-from dem_demo.cli import TRIED, main
+from dem_demo.cli import TRIAL_STEPS, main
 from dem_demo.dynamics import timestep
 from dem_demo.output.pictures import Pictures
-from dem_demo.output.record import Record
+from dem_demo.output.record import RunRecord
 from dem_demo.scene import shipped
 
 BASE = block("base", box=[4.0, 1.0], at=[0.5, -0.5], fixed=True)
@@ -93,7 +93,7 @@ def test_vtk_files_hold_what_the_record_holds(tmp_path):
     for name in ("closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa", "sliding"):
         np.testing.assert_array_equal(joints.cell_data[name][0], record.joints[-1][name])
     assert set(joints.cell_data["state"][0]) <= {0, 1, 2, 3}
-    mine = (np.sort(record.joints[-1]["who"]) == [0, 1]).all(axis=1)
+    mine = (np.sort(record.joints[-1]["blocks"]) == [0, 1]).all(axis=1)
     x = record.joints[-1]["ends"][mine][:, :, 0]  # of the joint below a block of 1 m
     assert [x.min(), x.max(), np.ptp(x, axis=1).sum()] == pytest.approx([-0.5, 0.5, 1.0], abs=1e-3)
     number = np.concatenate(blocks.cell_data["block"]).astype(int)
@@ -132,7 +132,7 @@ def test_fixed_rock_is_driven_and_a_block_on_it_told_relative_to_it(tmp_path):
     (tmp_path / "scene.toml").write_text(SHAKEN)
     scene, a = load(tmp_path / "scene.toml"), 0.2 * 9.80665
     record, _ = run(Simulation(scene), tmp_path / "out", pictures=None)
-    last, weight = record.monitored[-1], 2600 * 0.5  # kg/m2
+    last, weight = record.readings[-1], 2600 * 0.5  # kg/m2
     known = {
         "joint 1: normal_Pa": pytest.approx(weight * 9.81, rel=1e-3),
         "base: vx_m/s": pytest.approx(a * (record.times[-1] - 0.025), rel=1e-2),
@@ -143,7 +143,7 @@ def test_fixed_rock_is_driven_and_a_block_on_it_told_relative_to_it(tmp_path):
     }
     assert {name: last[name] for name in known} == known
     assert abs(last["joint 1: shear_Pa"]) == pytest.approx(weight * a, rel=1e-3)
-    assert record.moved.max() < 1e-5
+    assert record.distances.max() < 1e-5
     header, *_ = (tmp_path / "out" / "history.csv").read_text().splitlines()
     assert set(last) <= set(header.split(","))
 
@@ -154,7 +154,7 @@ def test_scenes_are_valid(name, capsys):
     assert main(["check", name]) == 0
     said = capsys.readouterr()
     assert "margin" in said.out
-    assert "without pictures, by its first steps" in said.out
+    assert " for figures and animation" in said.out
     assert "warning" not in said.err
 
 
@@ -168,14 +168,14 @@ def test_a_run_stopped_by_ctrl_c_goes_on_bit_for_bit(tmp_path, capsys, monkeypat
 
     def pressed(self):
         step(self)
-        if next(count) == TRIED + 37:  # the first ones tell how long the run will take
+        if next(count) == TRIAL_STEPS + 37:  # the first ones tell how long the run will take
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(Simulation, "step", pressed)
         assert main([*words, "part"]) == 130
     told = capsys.readouterr().err.splitlines()[-1]
-    assert told.startswith("dem_demo: interrupted; go on from ")
+    assert told.startswith("dem_demo: interrupted; resume from ")
     summary = json.loads((tmp_path / "part" / "summary.json").read_text())
     assert summary["stopped"] == "interrupted"
     assert 0 < summary["steps"] <= 37  # to the last frame
@@ -219,10 +219,12 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
     file, out, more = tmp_path / "scene.toml", tmp_path / "out", tmp_path / "more"
     file.write_text(text.replace("STEP", str(step)))
     assert main([str(file), "--no-pictures", "--out", str(out)]) == 2
-    assert re.search(f"{why}.*{out / 'refused'}", capsys.readouterr().err)
+    assert re.search(f"{why}.*{out / 'last_valid_state'}", capsys.readouterr().err)
     assert re.search(why, json.loads((out / "summary.json").read_text())["stopped"])
     assert main([str(file), "--out", str(out)]) == 2
-    assert "holds another run (summary.json, history.csv, refused)" in capsys.readouterr().err
+    assert (
+        "holds another run (summary.json, history.csv, last_valid_state)" in capsys.readouterr().err
+    )
     words = ["resume", str(out), "--step", "1e-4", "--no-pictures", "--out", str(more)]
     assert main(words) == 0
     summary = json.loads((more / "summary.json").read_text())
@@ -339,11 +341,11 @@ end = 0.1
 
 def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
     """Blocks with a set on each side: edge 0 of both, their bottoms, would give "bedding" twice."""
-    record = Record(Simulation(parse(CUT)))
+    record = RunRecord(Simulation(parse(CUT)))
     (slip,) = record.slips.values()
     assert slip["law"] == "bedding"
     assert slip["predicted_angle"] == pytest.approx(np.degrees(np.arctan(0.3)))
-    assert list(record.laws.values()) == ["bedding", "cross"]
+    assert list(record.joint_laws.values()) == ["bedding", "cross"]
 
 
 @pytest.mark.parametrize(
@@ -366,8 +368,8 @@ def test_resume_is_bit_identical(tmp_path, damage):
     batch = again.joints.by_law[again.joints.law_names.index("rock/rough")].pool.batch
     assert bool(damage) == (batch.plastic_work.max() > 0.0)
     # also the one that goes on tells how far blocks have moved since step 0
-    np.testing.assert_array_equal(Record(again).moved, Record(whole).moved)
-    assert Record(again).moved.max() > 1e-3
+    np.testing.assert_array_equal(RunRecord(again).distances, RunRecord(whole).distances)
+    assert RunRecord(again).distances.max() > 1e-3
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 

@@ -317,7 +317,7 @@ def test_an_angle_that_is_not_found_is_given_up(monkeypatch):
     """Two angles in turn, for ever: no fixed point to predict; and a law that fails on its path."""
     scene, angles = parse(TEXT), iter(10_000 * [20.0, 40.0])
     monkeypatch.setattr(monitors, "friction_angle", lambda law, stress: next(angles))
-    assert monitors.slip_angle(scene, "rock", 1, 1.0)["predicted_angle"] is None
+    assert monitors.predict_slip(scene, "rock", 1, 1.0)["predicted_angle"] is None
 
     monkeypatch.setattr(jl, "direct_shear", Mock(side_effect=PathError("no further", None)))
     assert monitors.shear_curve(scene.laws["rock"], 1e4, np.array([0.0, 1e-3])) is None

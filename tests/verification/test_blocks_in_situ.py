@@ -297,15 +297,15 @@ def test_the_run_names_loose_blocks_and_says_how_each_block_moved(tmp_path, caps
     out = tmp_path / "out"
     assert main([str(tmp_path / "scene.toml"), "--out", str(out), "--no-pictures"]) == 0
     printed = capsys.readouterr().out
-    assert "1 blocks cannot be held" in printed
+    assert "1 block has no static equilibrium" in printed
     assert "stuck to its face (1.73, 0.70)" in printed
     assert "blocks: " in printed  # a verdict without a [[rock]]
     summary = json.loads((out / "summary.json").read_text())
     assert summary["started_in_equilibrium"] is False
-    assert [block["block"] for block in summary["loose"]] == ["stuck to its face"]
+    assert [block["block"] for block in summary["unstable"]] == ["stuck to its face"]
     rows = list(csv.DictReader((out / "blocks.csv").read_text().splitlines()))
     assert [row["block"] for row in rows] == ["base", "block", "stuck to its face"]
-    assert [row["loose_at_start"] for row in rows] == ["0", "0", "1"]
+    assert [row["unstable_at_start"] for row in rows] == ["0", "0", "1"]
     fell = float(rows[2]["displacement_m"])
     assert fell == pytest.approx(0.5 * 9.81 * 0.02**2, rel=0.1)
     assert float(rows[2]["speed_m/s"]) == pytest.approx(9.81 * 0.02, rel=0.1)
@@ -318,15 +318,15 @@ def test_strength_reduction_with_and_without_loose_blocks(tmp_path, capsys):
     words = [str(tmp_path / "scene.toml"), "--out", str(out), "--until", "0.3"]
     assert main(["strength-reduction", *words]) == 0
     (row,) = json.loads((out / "strength.json").read_text())["rows"]
-    assert [block["block"] for block in row["loose"]] == ["stuck to its face"]
+    assert [block["block"] for block in row["unstable"]] == ["stuck to its face"]
     assert row["factor_of_safety"] is None
-    assert row["factor_without"] == pytest.approx(
+    assert row["factor_without_excluded"] == pytest.approx(
         np.tan(np.radians(35)) / np.tan(np.radians(25)), rel=0.01
     )
-    assert [block["block"] for block in row["first"]] == ["block"]
+    assert [block["block"] for block in row["initiating_blocks"]] == ["block"]
     assert (out / row["picture"]).exists()
     printed = capsys.readouterr().out
-    assert printed.index("cannot be held") < printed.index("factor of safety without")
+    assert printed.index("blocks are unstable") < printed.index("factor of safety without")
 
 
 HALF_ANGLE = np.arctan(1.25 / 2.0)  # rad: of the wedge at its apex, 32 degrees

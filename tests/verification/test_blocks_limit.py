@@ -14,10 +14,10 @@ from dem_demo import Simulation, load, parse
 from dem_demo.contact import ContactManager
 from dem_demo.dynamics.blocks import Blocks
 from dem_demo.dynamics.timestep import opening_and_sliding_rates
-from dem_demo.output.run import to_failure
-from dem_demo.studies.strength import FACTOR, factor_of_safety, seated, weakened
+from dem_demo.output.run import run_to_failure
+from dem_demo.studies.strength import LOG_FACTOR, factor_of_safety, settled, weakened
 
-FACTOR_TOLERANCE = FACTOR[2]  # relative, of a factor of safety
+FACTOR_TOLERANCE = LOG_FACTOR.tolerance  # relative, of a factor of safety
 
 SLOPE = """
 [[rock]]
@@ -83,11 +83,11 @@ def slope(**keys):
 
 def rotation_ratio(scene):
     """Radius times rotation over displacement: median of the blocks that move far."""
-    record, _ = to_failure(seated(scene), 0.3)
-    moves_far = record.moved > 0.5 * record.moved.max()
+    record, _ = run_to_failure(settled(scene), 0.3)
+    moves_far = record.distances > 0.5 * record.distances.max()
     radius = np.array([block.reach for block in scene.blocks])
     rotation = np.abs(record.motion[-1][2] - record.motion[0][2]) * radius
-    return np.median(rotation[moves_far] / record.moved[moves_far])
+    return np.median(rotation[moves_far] / record.distances[moves_far])
 
 
 @pytest.mark.slow

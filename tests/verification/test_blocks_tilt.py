@@ -9,9 +9,9 @@ from scipy.integrate import cumulative_trapezoid
 
 import jointlaw as jl
 from dem_demo import Simulation, load, parse
-from dem_demo.output.monitors import base_angle, look, watched_slips
-from dem_demo.output.record import Record
-from dem_demo.output.run import LOOKS
+from dem_demo.output.monitors import base_angle, start_slip_monitors, update_slip_monitors
+from dem_demo.output.record import RunRecord
+from dem_demo.output.run import SLIP_CHECK_INTERVAL
 from dem_demo.scene.blocks import rotation
 from dem_demo.scene.read import SCENES
 
@@ -88,11 +88,11 @@ def test_slip_at_the_peak_friction_of_the_law():
     """Tables that tilt at 0.05 degrees per second. The two contacts under a slab bear 60 and 40 %
     of its load, an error below 0.2 degrees."""
     sim = Simulation(load("tilt"))
-    slips_by_pair = watched_slips(sim)
+    slips_by_pair = start_slip_monitors(sim)
     slips = list(slips_by_pair.values())
     while any(slip["slip_angle"] is None for slip in slips) and sim.time < sim.scene.run.end:
-        steps(sim, LOOKS)
-        look(slips_by_pair, sim)
+        steps(sim, SLIP_CHECK_INTERVAL)
+        update_slip_monitors(slips_by_pair, sim)
         if all(slip["slip_angle"] is None for slip in slips):
             assert abs(sim.energy_balance.error) < 1e-4
     # the slab that slips accelerates, at the end to a mating length in a step
@@ -174,10 +174,10 @@ def test_a_slope_of_blocks_slides_as_newmarks_block():
     scene = load("shaken-slope-plain")
     dip = np.radians(25.0)
     sim = Simulation(scene)
-    record = Record(sim)
+    record = RunRecord(sim)
     until(sim, scene.run.end)
-    record.take(sim)
-    displacement = (record.displaced(-1) - record.displaced(0))[scene.rocks[0].free]
+    record.add_frame(sim)
+    displacement = (record.displacements(-1) - record.displacements(0))[scene.rocks[0].free]
     slip = (displacement @ [np.cos(dip), -np.sin(dip)]).mean()
     expected = newmark(scene, dip, sim.time)[1][-1]
     assert expected > 0.05

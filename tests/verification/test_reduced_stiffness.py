@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import jointlaw as jl
 from dem_demo import parse
-from dem_demo.studies.strength import FACTOR, factor_of_safety
+from dem_demo.studies.strength import LOG_FACTOR, factor_of_safety
 
 WEIGHT = 2600.0 * 9.81  # N/m3
 FRICTION = math.tan(math.radians(50.0))
@@ -63,7 +63,7 @@ def factor_of_bray(half_apex, stress, normal_stiffness, shear_stiffness):
 def test_roof_wedge_has_the_factor_of_bray(wedge):
     """The search ends 0.6 % from the factor at most."""
     found = factor_of_safety(parse(wedge_scene(*wedge)))
-    assert found == pytest.approx(factor_of_bray(*wedge), rel=1.1 * FACTOR[2])
+    assert found == pytest.approx(factor_of_bray(*wedge), rel=1.1 * LOG_FACTOR.tolerance)
 
 
 def rough_law(**changes):

@@ -164,13 +164,13 @@ def test_a_stopped_search_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(strength, "equilibrium_displacements", stops_at_the_fourth)
     words = ["strength-reduction", str(scene), "--out", str(out), "--until", "0.01"]
     assert main(words) == 130
-    assert "the same command goes on" in capsys.readouterr().err
+    assert "the same command continues" in capsys.readouterr().err
     assert (
         len(json.loads((out / "trials.json").read_text())["trials"]) == 5
     )  # with the search for unstable blocks and limit analysis
     assert main(words) == 0
     told = capsys.readouterr().out
-    found = re.search(r"scene: factor of safety ([\d.]+), critical tilt in degrees ([\d.]+)", told)
+    found = re.search(r"scene: factor of safety ([\d.]+), critical tilt ([\d.]+)", told)
     factor, tilt = map(float, found.groups())
     pressed = 2600.0 * 9.81 * math.cos(math.radians(DIP))  # Pa, by the slab's weight
     steepest = friction_angle(parse(SCENE).laws["rock"], pressed)

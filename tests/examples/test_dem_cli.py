@@ -1,0 +1,126 @@
+"""The command line of the block demo: help, examples, JSON on the standard output, messages."""
+
+import json
+import re
+import shlex
+
+import pytest
+from scene_text import PLAIN, block, on_base
+
+import jointlaw as jl
+from dem_demo import cli
+from dem_demo.cli import COMMANDS, main
+from dem_demo.scene import shipped
+
+SLAB = on_base(PLAIN, [1.0, 0.3], 10.0, end=0.01)
+
+
+def help_of(capsys, *words):
+    with pytest.raises(SystemExit) as stop:
+        main([*words, "--help"])
+    assert stop.value.code == 0
+    return capsys.readouterr().out
+
+
+def test_without_arguments_the_help_lists_commands_scenes_and_examples(capsys):
+    assert main([]) == 0
+    text = capsys.readouterr().out
+    assert text == help_of(capsys)
+    assert re.findall(r"^    (\w[\w-]*)", text, re.MULTILINE) == [one.name for one in COMMANDS]
+    listed = text.partition("scenes: ")[2].partition("\n\n")[0]
+    assert re.split(r",\s+", listed) == list(shipped())
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+def test_each_command_has_help_of_its_own_with_an_example(command, capsys):
+    text = help_of(capsys, command.name)
+    (example,) = re.findall(r"^example:\n  python -m dem_demo (.*)$", text, re.MULTILINE)
+    options = cli._parse(shlex.split(example))
+    assert options.run is command.run
+    for names, settings in command.options:
+        assert names[-1].lstrip("-") in text
+        assert settings["help"]
+
+
+def test_the_version_is_printed(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out == f"dem_demo {jl.__version__}\n"
+
+
+def test_json_is_all_that_is_on_the_standard_output(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(SLAB)
+    assert main(["scene.toml", "--out", "out", "--no-pictures", "--json"]) == 0
+    printed = capsys.readouterr()
+    summary = json.loads(printed.out)
+    assert summary == json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["rocks"][0]["state"] == "stable"
+    assert "blocks: stable" in printed.err
+    words = ["resume", "out", "--until", "0.02", "--no-pictures", "--json", "--out", "more"]
+    assert main(words) == 0
+    assert json.loads(capsys.readouterr().out)["model_time_s"] == pytest.approx(0.02, abs=1e-3)
+    words = ["strength-reduction", "scene.toml", "--until", "0.01", "--json", "--out", "strength"]
+    assert main(words) == 0
+    printed = capsys.readouterr()
+    (row,) = json.loads(printed.out)["rows"]
+    assert row["factor_of_safety"] == pytest.approx(1.7, rel=0.01)  # 0.3 / tan(10 degrees)
+    assert "scene: factor of safety 1.7" in printed.err
+
+
+def test_the_estimate_counts_figures_and_animation(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(SLAB)
+    for option, expected in (([], True), (["--no-pictures"], False)):
+        assert main(["scene.toml", "--force", "--out", "out", *option]) == 0
+        (line,) = re.findall(r"^estimated .*$", capsys.readouterr().out, re.MULTILINE)
+        assert ("s for figures and animation" in line) == expected
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.123, "0.12 s"), (99.0, "99 s"), (120.0, "2 min"), (7200.0, "2 hours")]
+)
+def test_durations_have_the_unit_of_their_size(seconds, text):
+    assert cli._format_duration(seconds) == text
+
+
+TILTING = f"""
+gravity = [0.0, -9.81]
+[laws.plain]
+{PLAIN}{block("base", box=[6.0, 1.0], at=[0.0, -0.5], fixed_motions=["x", "y"])}
+{block("slab", box=[1.0, 0.2], at=[0.0, 0.1])}
+[[drive]]
+block = "base"
+motion = "turn"
+times = [0.0, 1.0, 1.5, 2.5]
+values = [0.0, 25.0, 25.0, 0.0]
+[monitor]
+slip = [["slab", "base"]]
+[run]
+end = 4.0
+skin = 0.02
+"""
+
+
+@pytest.mark.slow
+def test_a_slab_that_slid_in_a_tilt_test_is_at_rest_and_has_not_failed(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(TILTING)
+    assert main(["scene.toml", "--out", "out", "--no-pictures"]) == 0
+    printed = capsys.readouterr().out
+    slip = float(
+        re.findall(r"slab: slipped at .* degrees.*; slip (.*) m$", printed, re.MULTILINE)[0]
+    )
+    assert slip > 0.1
+    (rock,) = json.loads((tmp_path / "out" / "summary.json").read_text())["rocks"]
+    assert rock["state"] == "at rest"
+    assert rock["displacement_m"] > rock["failure_displacement_m"]
+    assert "blocks: at rest; largest displacement" in printed
+
+
+def test_all_blocks_stable_at_twice_the_strength_are_reported_in_one_plain_line(tmp_path, capsys):
+    """A slab steeper than its friction: unstable as drawn, stable at twice the strength."""
+    (tmp_path / "steep.toml").write_text(on_base(PLAIN, [1.0, 0.3], 20.0, end=0.01))
+    words = ["strength-reduction", "steep.toml", "--until", "0.01", "--out", "out"]
+    assert main(words) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "scene: 1 of 1 blocks are unstable: block (0.00, 0.15)" in lines
+    assert "scene: 0 blocks stay unstable at strength x 2" in lines

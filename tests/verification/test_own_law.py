@@ -45,7 +45,8 @@ def test_factor_of_safety_is_that_of_both_strengths():
     """Friction and the clay's strength, over the weight along the slope."""
     strength = CLAY.friction * WEIGHT * math.cos(SLOPE) + CLAY.clay_strength * 2.0
     expected = strength / (WEIGHT * math.sin(SLOPE))
-    assert factor_of_safety(slab_scene(CLAY)) == pytest.approx(expected, rel=1.1 * LOG_FACTOR.tolerance)
+    factor = factor_of_safety(slab_scene(CLAY))
+    assert factor == pytest.approx(expected, rel=1.1 * LOG_FACTOR.tolerance)
 
 
 def test_a_scene_names_its_kind(monkeypatch):

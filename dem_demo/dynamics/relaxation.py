@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.kernels.engine import Step
 from jointlaw.native.library import load as load_law_library
 
 from ..compiled import RelaxationArrays, RelaxedLaw, address
@@ -124,16 +123,16 @@ class Relaxation:
         self.arrays.bind(self, *INPUT_ARRAYS, *WORK_ARRAYS)
         self.scale = float(np.linalg.norm(self.load)) or 1.0
 
-    def _law_step(self, law: jl.Law, contact: np.ndarray) -> tuple[Any, Step, np.ndarray]:
+    def _law_step(self, law: jl.Law, contact: np.ndarray) -> tuple[Any, jl.Step, np.ndarray]:
         """A batch of virgin joints for these contact points (m,), and a step that leaves it so."""
         m, dim = len(contact), self.start.shape[1]
         batch = law.joints(m, ledger=False)
-        step = Step(np.zeros((m, dim)), np.zeros((m, dim)), None, keep=False)
+        step = jl.Step(np.zeros((m, dim)), np.zeros((m, dim)), None, keep=False)
         if m:
             batch.take(step)  # prepares the call of the library
         return batch, step, contact
 
-    def _law_arrays(self, batch: Any, step: Step, contact: np.ndarray) -> RelaxedLaw:
+    def _law_arrays(self, batch: Any, step: jl.Step, contact: np.ndarray) -> RelaxedLaw:
         """Addresses of a step for the compiled relaxation."""
         if not len(contact):
             return RelaxedLaw()

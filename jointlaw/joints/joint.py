@@ -23,7 +23,8 @@ class _OfOne(Generic[T]):
 
     def __init__(self, of_batch: Any, kind: Callable[[Any], T]) -> None:
         self.of_batch, self.kind = of_batch, kind
-        self.__doc__ = of_batch.__doc__.replace("(n, dim)", "(dim,)").replace(" (n,)", "")
+        text = of_batch.__doc__ or ""  # `python -OO` has none
+        self.__doc__ = text.replace("(n, dim)", "(dim,)").replace(" (n,)", "")
 
     def __get__(self, joint: Joint | None, owner: type) -> T:
         if joint is None:

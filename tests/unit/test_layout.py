@@ -125,3 +125,9 @@ def test_importing_jointlaw_loads_no_slow_modules():
     modules = subprocess.check_output([sys.executable, "-c", code], text=True).split()
     assert "jointlaw" in modules
     assert [module for module in modules if module.startswith(LAZY_MODULES)] == []
+
+
+def test_packages_import_without_docstrings():
+    """`python -OO` strips docstrings and assertions."""
+    code = "import jointlaw, dem_demo; jointlaw.presets.load('linear-a3').joint().update([1, 0, 0])"
+    subprocess.run([sys.executable, "-OO", "-c", code], check=True)

@@ -157,7 +157,7 @@ class Relaxation:
             F=address(step.F),
         )
 
-    def _advance_in_python(self, batch: jl.JointBatch, step: Step) -> Any:
+    def _advance_in_python(self, batch: jl.JointBatch, step: jl.Step) -> Any:
         """A function that C calls for a step of the law; displacements and tractions are in `step`.
 
         Where displacements are too large for the law, tractions are not finite, as in the compiled

@@ -1,4 +1,4 @@
-"""Laws that all tests share, and how Hypothesis runs here."""
+"""Laws of all tests, and the settings of Hypothesis."""
 
 import hypothesis
 import kinds
@@ -13,18 +13,19 @@ hypothesis.settings.load_profile("jointlaw")
 
 @pytest.fixture(scope="session")
 def make_law():
-    """Smooth Westerly granite at the coarsest resolution, any parameter to be replaced."""
+    """A function: smooth Westerly granite at the coarsest resolution, with changed parameters."""
     return kinds.make_law
 
 
 @pytest.fixture(scope="session")
 def law():
+    """Smooth Westerly granite at the coarsest resolution."""
     return kinds.make_law()
 
 
 @pytest.fixture(scope="session", params=kinds.LAWS)
 def any_law(request):
-    """One law of each kind of joint that the code knows."""
+    """One law of each kind of joint."""
     return kinds.LAWS[request.param]
 
 

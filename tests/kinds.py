@@ -1,5 +1,5 @@
-"""The kinds of joints that the code knows, one law each: every test that goes through them does so
-by this list. And every declared parameter, off its default: no parameter is named here."""
+"""One law of each kind of joint, over which tests iterate. Every declared parameter with a value
+other than its default, without naming a parameter here."""
 
 import math
 from contextlib import suppress
@@ -18,7 +18,7 @@ from jointlaw.parameters.toml import kinds_of
 def make_law(
     a=3.0, b=0.5, c=0.1, K=2.0e8, lam=1.2, eta=0.5, mu=0.3, heights="population", damage=(), **more
 ) -> jl.JointLaw:
-    """Smooth Westerly granite at the coarsest resolution, any parameter to be replaced."""
+    """Smooth Westerly granite at the coarsest resolution, with changed parameters."""
     if isinstance(heights, str):
         heights = jl.GammaHeights(alpha=3.82, beta=1.15e-6, overlap=2e-6, formation=heights)
     defaults = {"asperity_density": 1e10, "closure_range": 1e-6, "resolution": "fast"}
@@ -66,64 +66,65 @@ LAWS = {
     "coulomb in a plane": jl.CoulombLaw(1e12, 5e11, 0.6, 1e5, plane=0.0),
 }
 
-# Sizes at which a parameter of this unit shows in joints that close by 1e-6 m
+# Values of a parameter, by unit, that change joints which close by 1e-6 m
 SIZES = {"": 0.3, "rad": 0.4, "m": 1e-6, "Pa": 3e4, "Pa/m": 3e11, "J/m2": 1e-2, "1/m2": 1e10}
 
 
 def declared(kind, path=""):
-    """Paths of all declared parameters of a kind of law, and of what it is made of."""
-    for name, said in parameters_of(kind).items():
-        inner = [one for one in kinds_of(said.kind).values() if is_dataclass(one)]
-        yield from chain.from_iterable(declared(one, f"{path}{name}.") for one in inner)
-        if not inner:
-            yield f"{path}{name}", said
+    """Paths and declarations of all parameters of a kind of law, and of its parts."""
+    for name, parameter in parameters_of(kind).items():
+        parts = [part for part in kinds_of(parameter.kind).values() if is_dataclass(part)]
+        yield from chain.from_iterable(declared(part, f"{path}{name}.") for part in parts)
+        if not parts:
+            yield f"{path}{name}", parameter
 
 
 PARAMETERS = {
-    f"{name}: {path}": (kind, path, said)
+    f"{name}: {path}": (kind, path, parameter)
     for name, kind in Law.kinds.items()
-    for path, said in dict(declared(kind)).items()
+    for path, parameter in dict(declared(kind)).items()
 }
 
 
 def with_value(part, path, value):
     """A law, or a part of it, with another value at a path of names."""
     name, _, rest = path.partition(".")
-    now = getattr(part, name)
-    return replace(part, **{name: with_value(now, rest, value) if rest else value})
+    inner = getattr(part, name)
+    return replace(part, **{name: with_value(inner, rest, value) if rest else value})
 
 
-def candidates(said, value):
+def candidates(parameter, value):
     """Values that a parameter of this value may have instead."""
-    if said.choices:
-        return [one for one in said.choices if one != value]
-    if said.kind in (bool, int):
-        return [not value] if said.kind is bool else [value + 1]
+    if parameter.choices:
+        return [choice for choice in parameter.choices if choice != value]
+    if parameter.kind in (bool, int):
+        return [not value] if parameter.kind is bool else [value + 1]
     if isinstance(value, tuple):
         return [(tuple(2.0 * x + 1.0 for x in value[0]), value[1])]
     if value and math.isfinite(value):
         return [1.2 * value, 0.8 * value]
-    size = SIZES[said.unit]
+    size = SIZES[parameter.unit]
     return [size, *(size * 10.0**k for k in (-3, -2, -1, 1, 2, 3))]
 
 
 def off_default(name):
-    """A law with this parameter off its default and off what the law beside it has, and that law.
+    """A law with a value of a parameter other than its default, and the unchanged law.
 
-    A law of the list in which the parameter is at work already comes first.
+    A law of the list whose value is not the default comes first.
     """
-    kind, path, said = PARAMETERS[name]
-    *above, last = path.split(".")
-    found = []
+    kind, path, parameter = PARAMETERS[name]
+    *parents, last = path.split(".")
+    variants = []
     for base in (law for law in LAWS.values() if type(law) is kind):
-        part = reduce(getattr, above, base)
+        part = reduce(getattr, parents, base)
         if last in getattr(part, "__dataclass_fields__", {}):
-            now, default = getattr(part, last), part.__dataclass_fields__[last].default
-            for value in candidates(said, now):
+            old_value = getattr(part, last)
+            default = part.__dataclass_fields__[last].default
+            for value in candidates(parameter, old_value):
                 with suppress(ValueError):
                     law = with_value(base, path, value)
-                    found.append((now == default, len(found), law, base))
+                    variants.append((old_value == default, len(variants), law, base))
                     break
-    assert found, f"no law of this file takes a value of {path}: add one above"
-    *_, law, base = min(found, key=lambda one: one[:2])
+    assert variants, f"no law of this file takes a value of {path}: add one above"
+    *_, law, base = min(variants, key=lambda variant: variant[:2])
     return law, base

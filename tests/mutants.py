@@ -1,11 +1,11 @@
-"""Faults drawn at random, put in one at a time: which does no test see?
+"""Mutation tests: random faults, inserted one at a time, and whether a test detects each.
 
     python tests/mutants.py jointlaw/laws jointlaw/native/law.h --count 40 --seed 1
 
-A first run tells which test runs which line; it is kept for the same sources. Then each fault is
-run against the tests of its line; of its file, where the line runs at import; of all joints or
-blocks, where it is in C. All this in copies, under the temporary folder, of what git holds, staged
-changes included. No part of CI. Needs `pip install pytest-cov`.
+A first run records which test runs which line; the record is reused for the same sources. Then each
+fault is run against the tests of its line; of its file if the line runs at import; of all joints or
+blocks if it is in C. Everything runs in copies of the index of git, staged changes included, under
+the temporary folder. Not part of CI. Needs `pip install pytest-cov`.
 """
 
 import argparse
@@ -26,8 +26,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-HOME = Path(tempfile.gettempdir()) / f"mutants-{hashlib.sha256(bytes(ROOT)).hexdigest()[:8]}"
-BUILT = {"jointlaw": "jointlaw/native/built", "dem_demo": "dem_demo/native/built"}
+WORK_FOLDER = Path(tempfile.gettempdir()) / f"mutants-{hashlib.sha256(bytes(ROOT)).hexdigest()[:8]}"
+BUILD_FOLDERS = {"jointlaw": "jointlaw/native/built", "dem_demo": "dem_demo/native/built"}
 COVERAGE = """\
 [run]
 source = jointlaw, dem_demo
@@ -36,7 +36,7 @@ patch = subprocess
 [json]
 show_contexts = true
 """
-IN_C = (
+C_REPLACEMENTS = (
     (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " / "), (r" / ", " * "), (r" < ", " <= "),
     (r" > ", " >= "), (r" ([<>])= ", r" \1 "), (r" == ", " != "), (r" && ", " || "),
     (r" \|\| ", " && "), (r" \+= ", " -= "), (r" -= ", " += "), (r"(?<=[(,= ])-(?=\w)", ""),
@@ -44,7 +44,7 @@ IN_C = (
     (r"\bif \((.*)\)", r"if (!(\1))"), (r"\b(\w+)\((\w+), (\w+)", r"\1(\3, \2"),
     (r"^( +)[^{}]*;$", r"\1;"),
 )  # fmt: skip
-OTHER = {
+OPPOSITE_OPERATORS = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
     ast.FloorDiv: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.And: ast.Or,
     ast.Or: ast.And, ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt,
@@ -53,18 +53,20 @@ OTHER = {
 }  # fmt: skip
 
 
-def changed(node, **fields):
+def with_fields(node, **fields):
     """A copy of a node with other fields."""
     return type(node)(**(vars(node) | fields))
 
 
 def faults_of(node):
-    """Nodes of Python, this one or its condition, each with what may stand in its place."""
+    """Faults of a node of Python: the node or its condition, and its replacement."""
     match node:
-        case ast.BinOp(op=op) | ast.BoolOp(op=op) | ast.AugAssign(op=op) if type(op) in OTHER:
-            yield node, changed(node, op=OTHER[type(op)]())
+        case ast.BinOp(op=op) | ast.BoolOp(op=op) | ast.AugAssign(op=op) if (
+            type(op) in OPPOSITE_OPERATORS
+        ):
+            yield node, with_fields(node, op=OPPOSITE_OPERATORS[type(op)]())
         case ast.Compare(ops=[op]):
-            yield node, changed(node, ops=[OTHER[type(op)]()])
+            yield node, with_fields(node, ops=[OPPOSITE_OPERATORS[type(op)]()])
         case ast.UnaryOp(operand=operand):
             yield node, operand
         case ast.Constant(value=bool(value)):
@@ -79,118 +81,128 @@ def faults_of(node):
             yield test, ast.UnaryOp(ast.Not(), test)
             yield test, ast.Constant(False)
         case ast.Call(args=[first, second, *rest]):
-            yield node, changed(node, args=[second, first, *rest])
+            yield node, with_fields(node, args=[second, first, *rest])
         case ast.Call(keywords=[*rest, _]):
-            yield node, changed(node, keywords=rest)
+            yield node, with_fields(node, keywords=rest)
         case ast.Raise() | ast.Assign() | ast.Expr():
             yield node, ast.Pass()
 
 
-def in_python(text):
-    """Each fault: its line, that of its statement as coverage counts, its first and last byte, and
-    what stands there. Types, docstrings and messages have none.
+def faults_in_python(text):
+    """Faults of a source file: line, line of the statement, first and last byte, new text.
+
+    Types, docstrings and messages have no faults.
     """
     starts = [0, *itertools.accumulate(map(len, text.splitlines(keepends=True)))]
     queue = [(ast.parse(text), 0)]
     while queue:
-        node, of = queue.pop()
+        node, statement = queue.pop()
         docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         if docstring or isinstance(node, ast.JoinedStr):
             continue
-        of = node.lineno if isinstance(node, ast.stmt) else of
-        for name, below in ast.iter_fields(node):
+        statement = node.lineno if isinstance(node, ast.stmt) else statement
+        for name, value in ast.iter_fields(node):
             if name not in ("annotation", "returns"):
-                below = below if isinstance(below, list) else [below]
-                queue += [(one, of) for one in below if isinstance(one, ast.AST)]
+                children = value if isinstance(value, list) else [value]
+                queue += [(child, statement) for child in children if isinstance(child, ast.AST)]
         for old, new in faults_of(node):
-            said = ast.unparse(new) if isinstance(new, ast.stmt) else f"({ast.unparse(new)})"
+            source = ast.unparse(new)
+            replacement = source if isinstance(new, ast.stmt) else f"({source})"
             start = starts[old.lineno - 1] + old.col_offset
-            yield old.lineno, of, start, starts[old.end_lineno - 1] + old.end_col_offset, said
+            end = starts[old.end_lineno - 1] + old.end_col_offset
+            yield old.lineno, statement, start, end, replacement
 
 
-def in_c(text):
-    """As `in_python`; statements are not counted: 0."""
+def faults_in_c(text):
+    """As `faults_in_python`; coverage does not count the statements: 0."""
     start = 0
     for i, line in enumerate(text.splitlines(keepends=True), 1):
         code = line.partition(b"/*")[0].rstrip()
-        for rule, new in IN_C if re.match(rb"\s+\w", code) else ():
-            for at in re.finditer(rule, code.decode()):
-                yield i, 0, start + at.start(), start + at.end(), at.expand(new)
+        for rule, new in C_REPLACEMENTS if re.match(rb"\s+\w", code) else ():
+            for match in re.finditer(rule, code.decode()):
+                yield i, 0, start + match.start(), start + match.end(), match.expand(new)
         start += len(line)
 
 
 class Copy:
-    """A copy of the repository, in which a fault is put in and tests are run."""
+    """A copy of the repository, in which a fault is inserted and tests are run."""
 
     def __init__(self, name):
-        self.at = HOME / name
-        shutil.rmtree(self.at, ignore_errors=True)
-        command = ["git", "checkout-index", "--all", f"--prefix={self.at}/"]
+        self.root = WORK_FOLDER / name
+        shutil.rmtree(self.root, ignore_errors=True)
+        command = ["git", "checkout-index", "--all", f"--prefix={self.root}/"]
         subprocess.run(command, cwd=ROOT, check=True)
-        for built in BUILT.values():
-            shutil.copytree(ROOT / built, self.at / built)
+        for folder in BUILD_FOLDERS.values():
+            shutil.copytree(ROOT / folder, self.root / folder)
 
-    def python(self, *arguments, limit=None):
-        """Run Python there, with 4 GiB of memory; exit status and what it wrote."""
-        done = subprocess.run(
-            [sys.executable, "-m", *arguments], cwd=self.at, timeout=limit, text=True,
-            env=os.environ | {"PYTHONPATH": str(self.at), "PYTHONDONTWRITEBYTECODE": "1"},
+    def run_python(self, *arguments, limit=None):
+        """Run a module of Python in the copy, with 4 GiB of memory; exit status and output."""
+        process = subprocess.run(
+            [sys.executable, "-m", *arguments], cwd=self.root, timeout=limit, text=True,
+            env=os.environ | {"PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1"},
             capture_output=True,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (1 << 32, 1 << 32)),
         )  # fmt: skip
-        return done.returncode, done.stdout + done.stderr
+        return process.returncode, process.stdout + process.stderr
 
-    def pytest(self, *arguments, **limit):
-        plain = "-q", "-p", "no:cacheprovider", "-p", "no:randomly"
-        return self.python("pytest", *plain, *arguments, **limit)
+    def run_pytest(self, *arguments, **limit):
+        """Run pytest in the copy; exit status and output."""
+        options = "-q", "-p", "no:cacheprovider", "-p", "no:randomly"
+        return self.run_python("pytest", *options, *arguments, **limit)
 
     def library(self, package):
-        """The bytes of the library without the hash of its sources and the linker's."""
-        (made,) = (self.at / BUILT[package]).glob("lib*")
-        return re.sub(rb"[0-9a-f]{16}|GNU\0.{20}", b"", made.read_bytes(), flags=re.DOTALL)
+        """The bytes of the library without the hashes of its sources and of the linker."""
+        (file,) = (self.root / BUILD_FOLDERS[package]).glob("lib*")
+        return re.sub(rb"[0-9a-f]{16}|GNU\0.{20}", b"", file.read_bytes(), flags=re.DOTALL)
 
-    def judge(self, name, fault, tests, limit):
-        """What comes of a file with a fault, and the first test that sees it."""
-        file, native, package = self.at / name, "native" in name, Path(name).parts[0]
-        before, library = file.read_bytes(), native and self.library(package)
+    def try_fault(self, name, faulty_text, tests, limit):
+        """The fate of a file with a fault, and the first test that detects it."""
+        file = self.root / name
+        is_native = "native" in name
+        package = Path(name).parts[0]
+        original_text = file.read_bytes()
+        original_library = self.library(package) if is_native else None
         try:
-            file.write_bytes(fault)
-            if native and self.python(f"{package}.native")[0]:
+            file.write_bytes(faulty_text)
+            if is_native and self.run_python(f"{package}.native")[0]:
                 return "cannot be built", ""
-            if file.suffix != ".py" and self.library(package) == library:
+            if file.suffix != ".py" and self.library(package) == original_library:
                 return "the same library", ""
-            (self.at / "chosen").write_text("\n".join(tests))
-            status, said = self.pytest("-x", "-n0", "-m", "", "@chosen", limit=limit)
-            by = re.findall(r"^(?:FAILED|ERROR|E +) ?(.*?)(?: - |$)", said, re.M) or ["all"]
-            return ("seen", f"by {by[-1]}") if status else ("survived", f"{len(tests)} tests")
+            (self.root / "chosen").write_text("\n".join(tests))
+            status, output = self.run_pytest("-x", "-n0", "-m", "", "@chosen", limit=limit)
+            pattern = r"^(?:FAILED|ERROR|E +) ?(.*?)(?: - |$)"
+            detected_by = re.findall(pattern, output, re.MULTILINE) or ["all"]
+            if status:
+                return "detected", f"by {detected_by[-1]}"
+            return "survived", f"{len(tests)} tests"
         except subprocess.TimeoutExpired:
             return "too long", ""
         finally:
-            file.write_bytes(before)
-            if native:
-                built = BUILT[package]
-                shutil.copytree(ROOT / built, self.at / built, dirs_exist_ok=True)
+            file.write_bytes(original_text)
+            if is_native:
+                folder = BUILD_FOLDERS[package]
+                shutil.copytree(ROOT / folder, self.root / folder, dirs_exist_ok=True)
 
 
 def tests_of_lines(marks):
-    """For each file the tests that run each of its lines; none for what only a command runs."""
-    copied = Copy("map")
-    paths = [path for path in sorted(copied.at.rglob("*.py")) if path.name != Path(__file__).name]
-    made = hashlib.sha256(b"".join([marks.encode(), *(path.read_bytes() for path in paths)]))
-    data = HOME / f"lines-{made.hexdigest()[:12]}.json"
+    """Tests of each line of each file; none for a line that only a command runs."""
+    copy = Copy("map")
+    paths = [path for path in sorted(copy.root.rglob("*.py")) if path.name != Path(__file__).name]
+    digest = hashlib.sha256(b"".join([marks.encode(), *(path.read_bytes() for path in paths)]))
+    data = WORK_FOLDER / f"lines-{digest.hexdigest()[:12]}.json"
     if not data.exists():
-        (copied.at / "coverage.ini").write_text(COVERAGE)
+        (copy.root / "coverage.ini").write_text(COVERAGE)
         options = "--cov", "--cov-config=coverage.ini", "--cov-context=test"
-        status, said = copied.pytest("-m", marks, *options, "--cov-report=json:lines.json")
+        status, output = copy.run_pytest("-m", marks, *options, "--cov-report=json:lines.json")
         if status:
-            raise SystemExit(f"tests fail without a fault:\n{said[-1000:]}")
-        (copied.at / "lines.json").rename(data)
+            raise SystemExit(f"tests fail without a fault:\n{output[-1000:]}")
+        (copy.root / "lines.json").rename(data)
     return {
         file: {
-            int(line): {one.rpartition("|")[0] for one in contexts if "::" in one}
-            for line, contexts in found["contexts"].items()
+            int(line): {context.rpartition("|")[0] for context in contexts if "::" in context}
+            for line, contexts in report["contexts"].items()
         }
-        for file, found in json.loads(data.read_text())["files"].items()
+        for file, report in json.loads(data.read_text())["files"].items()
     }
 
 
@@ -203,40 +215,60 @@ def main():
     parser.add_argument("--slow", action="store_true", help="the slow tests too")
     options = parser.parse_args()
     lines = tests_of_lines("" if options.slow else "not slow")
-    every = set().union(*(tests for file in lines.values() for tests in file.values()))
-    copies, found = [Copy(f"copy-{i}") for i in range(2)], collections.defaultdict(set)
-    root, counts = copies[0].at, collections.Counter()
-    for where in (root / one for one in options.where):
-        for path in [where] if where.is_file() else sorted(where.rglob("*.*")):
-            if path.suffix in (".py", ".c", ".h") and "built" not in path.parts:
-                made = (in_python if path.suffix == ".py" else in_c)(path.read_bytes())
-                for line, *fault in made:
-                    found[str(path.relative_to(root)), line].add(tuple(fault))
-    draw = random.Random(options.seed)
-    drawn = [(*place, *draw.choice(sorted(found[place])))
-             for place in draw.sample(sorted(found), min(options.count, len(found)))]  # fmt: skip
+    copies = [Copy(f"copy-{i}") for i in range(2)]
+    faults = faults_by_line(copies[0].root, options.where)
+    rng = random.Random(options.seed)
+    selected = rng.sample(sorted(faults), min(options.count, len(faults)))
+    drawn = [(*place, *rng.choice(sorted(faults[place]))) for place in selected]
+    counts = collections.Counter()
 
-    def run(copied, drawn):
+    def try_all(copy, drawn):
         for name, line, statement, start, end, new in drawn:
-            text, runs = (copied.at / name).read_bytes(), name
-            if not statement:
-                runs = (
-                    "dem_demo/compiled.py" if "dem_demo" in name else "jointlaw/kernels/engine.py"
-                )
-            of_file = lines.get(runs, {})
-            ran = not statement or statement in of_file
-            tests = ran and (of_file.get(statement) or set().union(*of_file.values()) or every)
-            order = sorted(tests, key=lambda test: ("/unit/" not in test, test)) if tests else []
-            fault = text[:start] + new.encode() + text[end:]
-            fate = copied.judge(name, fault, order, options.limit) if tests else ("not run", "")
+            text = (copy.root / name).read_bytes()
+            faulty_text = text[:start] + new.encode() + text[end:]
+            tests = sorted(tests_of_statement(lines, name, statement), key=unit_tests_first)
+            if tests:
+                fate = copy.try_fault(name, faulty_text, tests, options.limit)
+            else:
+                fate = "not run", ""
             counts[fate[0]] += 1
-            was = text.splitlines()[line - 1].decode().strip()
+            source = text.splitlines()[line - 1].decode().strip()
             change = " ".join(f"{text[start:end].decode()} -> {new}".split())
-            print(*fate, f"\n  {name}:{line}: {was}\n  {change}", flush=True)
+            print(*fate, f"\n  {name}:{line}: {source}\n  {change}", flush=True)
 
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(run, copies, (drawn[::2], drawn[1::2])))
-    print(f"{len(found)} lines; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
+        list(pool.map(try_all, copies, (drawn[::2], drawn[1::2])))
+    print(f"{len(faults)} lines; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
+
+
+def faults_by_line(root, places):
+    """Faults of the files and folders, by file and line."""
+    faults = collections.defaultdict(set)
+    for place in (root / name for name in places):
+        for path in [place] if place.is_file() else sorted(place.rglob("*.*")):
+            if path.suffix in (".py", ".c", ".h") and "built" not in path.parts:
+                find_faults = faults_in_python if path.suffix == ".py" else faults_in_c
+                for line, *fault in find_faults(path.read_bytes()):
+                    faults[str(path.relative_to(root)), line].add(tuple(fault))
+    return faults
+
+
+def tests_of_statement(lines, name, statement):
+    """Tests that run a statement; in C (0) tests of the Python module that loads the library."""
+    if statement:
+        by_line = lines.get(name, {})
+        if statement not in by_line:
+            return set()
+    else:
+        module = "dem_demo/compiled.py" if "dem_demo" in name else "jointlaw/kernels/engine.py"
+        by_line = lines.get(module, {})
+    every = set().union(*(tests for file in lines.values() for tests in file.values()))
+    return by_line.get(statement) or set().union(*by_line.values()) or every
+
+
+def unit_tests_first(test):
+    """Sort key of a test."""
+    return "/unit/" not in test, test
 
 
 if __name__ == "__main__":

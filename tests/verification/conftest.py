@@ -1,4 +1,4 @@
-"""What the tests of this folder share."""
+"""Fixtures of the verification tests."""
 
 import json
 
@@ -9,7 +9,7 @@ import pytest
 def record(record_property):
     """record(key, *values): figures for the report of the run, from which docs make tables."""
 
-    def note(key, *values):
+    def add_property(key, *values):
         record_property(key, json.dumps(values, default=float))
 
-    return note
+    return add_property

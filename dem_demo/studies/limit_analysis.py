@@ -24,7 +24,8 @@ from ..dynamics.timestep import opening_and_sliding_rates
 from ..output.monitors import slip_distance
 from ..scene import Scene
 
-SMALLEST_FACTOR, LARGEST_FACTOR = 1 / 64, 64.0
+SMALLEST_FACTOR = 1 / 64
+LARGEST_FACTOR = 64.0
 TOLERANCE = 1e-3  # of the factor
 STRESSES = 7  # at which the strength of a rough law gets a tangent
 STRESS_RANGE = 1e-3, 3.0  # of the largest overburden stress: where they lie
@@ -73,8 +74,9 @@ def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBala
     load = ((blocks.gravity + blocks.loads) * blocks.inverse_sqrt_inertia)[blocks.is_free]
     if excluded is not None:
         block_of_motion = np.nonzero(blocks.is_free)[0]
-        kept = ~excluded[block_of_motion]
-        motions, load = motions[kept], load[kept]
+        is_included = ~excluded[block_of_motion]
+        motions = motions[is_included]
+        load = load[is_included]
     stress = overburden_stress(scene)
     strengths = [strength_of(law, stress) for law in scene.laws.values()]
     return ForceBalance(
@@ -108,11 +110,11 @@ def strength_of(law: jl.Law, stress: float) -> Strength:
     """
     if type(law) is jl.CoulombLaw:  # a subclass may have more elements
         return Strength(np.array([law.cohesion]), np.array([law.friction]), law.tension)
-    low, high = (share * stress for share in STRESS_RANGE)
+    low, high = (fraction * stress for fraction in STRESS_RANGE)
     stresses = np.geomspace(low, high, STRESSES)
     peaks = np.array([peak_strength(law, s) for s in stresses])
-    beside = np.array([peak_strength(law, SLOPE_STEP * s) for s in stresses])
-    friction = (beside - peaks) / ((SLOPE_STEP - 1.0) * stresses)
+    strength_nearby = np.array([peak_strength(law, SLOPE_STEP * s) for s in stresses])
+    friction = (strength_nearby - peaks) / ((SLOPE_STEP - 1.0) * stresses)
     return Strength(peaks - friction * stresses, friction, law.tensile_strength)
 
 
@@ -138,7 +140,8 @@ def can_balance(balance: ForceBalance, factor: float) -> bool:
     scale = np.abs(balance.load).max()
     if not scale:
         return True
-    area, law = balance.area / scale, balance.law
+    area = balance.area / scale
+    law = balance.law
     first = [strength.friction.argmax() for strength in balance.strengths]
     pairs = list(zip(balance.strengths, first, strict=True))
     slope = np.array([strength.friction[i] for strength, i in pairs])[law] / factor
@@ -147,24 +150,25 @@ def can_balance(balance: ForceBalance, factor: float) -> bool:
     cohesion = np.array([strength.cohesion[i] for strength, i in pairs])[law] * area / factor
     tension = np.array([strength.tension for strength in balance.strengths])[law] * area / factor
     rest = np.where(free, np.inf, np.maximum(cohesion - slope * tension, 0.0))
-    count, cohesive = len(area), np.flatnonzero(rest > 0)
+    count = len(area)
+    cohesive = np.flatnonzero(rest > 0)
     sliding = balance.shear @ diags(slope)
     equations = hstack(
         [balance.normal + sliding, balance.normal - sliding, balance.shear[:, cohesive]]
     ).tocsr()
-    right = -balance.load / scale + balance.normal @ tension
+    right_side = -balance.load / scale + balance.normal @ tension
     bounds = np.zeros((equations.shape[1], 2))
     bounds[: 2 * count, 1] = np.inf
     bounds[2 * count :] = np.stack([-rest[cohesive], rest[cohesive]], axis=1)
     rows, limits = _further_lines(balance, first, factor, area, slope, tension, cohesive)
     for method in ("highs-ipm", "highs-ds"):
-        found = linprog(
-            np.zeros(equations.shape[1]), A_ub=rows, b_ub=limits, A_eq=equations, b_eq=right,
+        solution = linprog(
+            np.zeros(equations.shape[1]), A_ub=rows, b_ub=limits, A_eq=equations, b_eq=right_side,
             bounds=bounds, method=method,
         )  # fmt: skip
-        if found.status in (0, INFEASIBLE):
-            return found.status == 0
-    raise RuntimeError(f"limit analysis at a factor of {factor:.4g}: {found.message}")
+        if solution.status in (0, INFEASIBLE):
+            return solution.status == 0
+    raise RuntimeError(f"limit analysis at a factor of {factor:.4g}: {solution.message}")
 
 
 def _further_lines(balance, first, factor, area, slope, tension, cohesive):
@@ -172,7 +176,8 @@ def _further_lines(balance, first, factor, area, slope, tension, cohesive):
     count = len(area)
     place = np.full(count, -1)
     place[cohesive] = 2 * count + np.arange(len(cohesive))
-    rows, limits = [], []
+    rows = []
+    limits = []
     for number, strength in enumerate(balance.strengths):
         contacts = np.flatnonzero(balance.law == number)
         for line in range(len(strength.friction)):
@@ -205,8 +210,10 @@ def limit_factor(scene: Scene, excluded: np.ndarray | None = None) -> float | No
     strength, 0.0 where none are found with 64 times the strength.
     """
     balance = force_balance(scene, excluded)
-    low, high = SMALLEST_FACTOR, LARGEST_FACTOR
-    factor, step = 1.0, 2.0
+    low = SMALLEST_FACTOR
+    high = LARGEST_FACTOR
+    factor = 1.0
+    step = 2.0
     if can_balance(balance, factor):
         low = factor
         while factor < LARGEST_FACTOR:

@@ -19,7 +19,8 @@ UNIT_WEIGHT = 2600.0 * 9.81
 @pytest.mark.parametrize("dip", [20.0, 40.0])
 def test_block_on_a_plane(cohesion, dip):
     scene = parse(on_base(coulomb(0.7, cohesion=cohesion), [3.0, 0.75], dip))
-    weight, angle = UNIT_WEIGHT * 3.0 * 0.75, math.radians(dip)
+    weight = UNIT_WEIGHT * 3.0 * 0.75
+    angle = math.radians(dip)
     strength = weight * math.cos(angle) * 0.7 + cohesion * 3.0
     assert limit_factor(scene) == pytest.approx(strength / (weight * math.sin(angle)), rel=EXACT)
 
@@ -27,7 +28,10 @@ def test_block_on_a_plane(cohesion, dip):
 def test_column_that_tension_keeps_from_toppling():
     """Its heel carries tension over half of the base: the moment about the toe is that of the
     tension over the base, as in the discretised joint (two contact points)."""
-    dip, height, width, tension = 25.0, 4.0, 1.0, 1.2e5
+    dip = 25.0
+    height = 4.0
+    width = 1.0
+    tension = 1.2e5
     law = coulomb(0.8, cohesion=2e6, tension=tension)
     scene = parse(on_base(law, [width, height], dip))
     angle = math.radians(dip)
@@ -40,11 +44,16 @@ def test_column_that_tension_keeps_from_toppling():
 
 def planar_slide(filled, friction=0.7, cohesion=4e4):
     """A planar slide of 30 m with a tension crack, and its factor of safety by Hoek and Bray."""
-    height, face, plane, behind = 30.0, math.radians(65), math.radians(38), 8.0
+    height = 30.0
+    face = math.radians(65)
+    plane = math.radians(38)
+    behind = 8.0
     crest = (-height / math.tan(face), height)
     x = crest[0] - behind
-    top, bottom = (x, height), (x, -x * math.tan(plane))
-    crack, length = top[1] - bottom[1], math.hypot(*bottom)
+    top = (x, height)
+    bottom = (x, -x * math.tan(plane))
+    crack = top[1] - bottom[1]
+    length = math.hypot(*bottom)
     level = bottom[1] + filled * crack
     corners = [(0, 0), crest, top, bottom]
     edges = zip(corners, [*corners[1:], corners[0]], strict=True)
@@ -52,7 +61,8 @@ def planar_slide(filled, friction=0.7, cohesion=4e4):
     weight = UNIT_WEIGHT * area
     uplift = 0.5 * 9810 * filled * crack * length
     thrust = 0.5 * 9810 * (filled * crack) ** 2
-    sin, cos = math.sin(plane), math.cos(plane)
+    sin = math.sin(plane)
+    cos = math.cos(plane)
     normal = weight * cos - uplift - thrust * sin
     shear = weight * sin + thrust * cos
     text = "[laws.joint]\n" + coulomb(friction, cohesion=cohesion)
@@ -100,7 +110,8 @@ def test_tangents_of_a_rough_law_lie_above_its_strength():
 
 def test_block_on_a_rough_joint():
     """Its bound is the strength of the law at its normal stress over its shear stress."""
-    dip, height = math.radians(40.0), 0.75
+    dip = math.radians(40.0)
+    height = 0.75
     scene = parse(on_base(ROCK, [3.0, height], 40.0))
     law: jl.JointLaw = scene.laws["rock"]
     normal, shear = (UNIT_WEIGHT * height * f(dip) for f in (math.cos, math.sin))

@@ -20,13 +20,13 @@ FRICTION = math.tan(math.radians(50.0))
 def wedge_scene(half_apex, stress, normal_stiffness, shear_stiffness):
     """A symmetric wedge 2 m wide in a roof under horizontal stress (Pa), its apex above."""
     height = 1.0 / math.tan(math.radians(half_apex))
-    left = [(-6, 0), (-1, 0), (0, height), (-6, height)]
-    right = [(1, 0), (6, 0), (6, height), (0, height)]
+    left_side = [(-6, 0), (-1, 0), (0, height), (-6, height)]
+    right_side = [(1, 0), (6, 0), (6, height), (0, height)]
     return (
         "gravity = [0.0, -9.81]\n[laws.joint]\n"
         + coulomb(FRICTION, normal_stiffness, shear_stiffness)
-        + block("left", corners=left, fixed=True)
-        + block("right", corners=right, fixed=True)
+        + block("left", corners=left_side, fixed=True)
+        + block("right", corners=right_side, fixed=True)
         + block("wedge", corners=[(-1, 0), (1, 0), (0, height)])
         + "[in_situ]\n"
         + lines(stress=[stress, 0.0, 0.0])
@@ -39,8 +39,10 @@ def factor_of_bray(half_apex, stress, normal_stiffness, shear_stiffness):
     stiffnesses (Brady and Brown, Rock Mechanics for Underground Mining, 1985, section 8.3)."""
     alpha = math.radians(half_apex)
     height = 1.0 / math.tan(alpha)
-    weight, thrust = WEIGHT * height, stress * height
-    kn, ks = normal_stiffness, shear_stiffness
+    weight = WEIGHT * height
+    thrust = stress * height
+    kn = normal_stiffness
+    ks = shear_stiffness
 
     def surplus(factor):
         phi = math.atan(FRICTION / factor)
@@ -62,8 +64,8 @@ def factor_of_bray(half_apex, stress, normal_stiffness, shear_stiffness):
 )
 def test_roof_wedge_has_the_factor_of_bray(wedge):
     """The search ends 0.6 % from the factor at most."""
-    found = factor_of_safety(parse(wedge_scene(*wedge)))
-    assert found == pytest.approx(factor_of_bray(*wedge), rel=1.1 * LOG_FACTOR.tolerance)
+    factor = factor_of_safety(parse(wedge_scene(*wedge)))
+    assert factor == pytest.approx(factor_of_bray(*wedge), rel=1.1 * LOG_FACTOR.tolerance)
 
 
 def rough_law(**changes):
@@ -93,8 +95,8 @@ def test_reduced_rough_law_keeps_its_stiffness(stress, factor):
     assert normal_stiffness_f == pytest.approx(normal_stiffness, rel=0.04)
     first = [s > 0 for s in (slid, slid_f)]
     stiffness, stiffness_f = (
-        curve[mask][0] / way[mask][0]
-        for curve, way, mask in zip((shear, shear_f), (slid, slid_f), first, strict=True)
+        curve[mask][0] / slip[mask][0]
+        for curve, slip, mask in zip((shear, shear_f), (slid, slid_f), first, strict=True)
     )
     assert 0.7 * stiffness < stiffness_f < 1.25 * stiffness
 
@@ -115,8 +117,8 @@ def test_no_tangent_in_a_reduction_exceeds_the_bound_of_the_time_step(kind, fact
     scale = np.array([1.0, 1.0 / factor])
     for _ in range(60):
         size = batch.delta[:, 0] * 10 ** rng.uniform(-5, -0.7, 100)
-        way = rng.uniform(0, 2 * np.pi, 100)
-        step = np.stack([size * np.cos(way), size * np.sin(way) / factor], axis=1)
+        direction = rng.uniform(0, 2 * np.pi, 100)
+        step = np.stack([size * np.cos(direction), size * np.sin(direction) / factor], axis=1)
         _, C = batch.update(step)
         largest = np.abs(np.linalg.eigvals(scale[:, None] * C * scale)).max(axis=1)
         bound = inside.first_loading_stiffness(np.maximum(batch.delta[:, 0], 1e-12), factor)

@@ -22,7 +22,8 @@ from dem_demo.studies.strength import alone, factor_of_safety, weakened
 
 
 def search_of(scene):
-    blocks, joints = Blocks(scene), Joints(scene)
+    blocks = Blocks(scene)
+    joints = Joints(scene)
     manager = ContactManager(scene, blocks.motion)
     sliding = create_joints(scene, blocks, manager, joints)
     return EquilibriumSearch(scene, blocks, manager, joints, sliding)
@@ -40,8 +41,8 @@ def test_compiled_forces_are_the_assembled_ones(name, kernel, monkeypatch):
     rng = np.random.default_rng(0)
     y = y + 0.1 * np.abs(y).max() * rng.standard_normal(len(y))
     expected = search.expand(search._unbalanced(y)[0])
-    found = search._relaxation().unbalanced(search.expand(y))
-    assert found == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
+    result = search._relaxation().unbalanced(search.expand(y))
+    assert result == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
 
 
 def test_an_error_of_a_law_in_python_passes_through_the_compiled_iterations(monkeypatch):
@@ -62,9 +63,11 @@ def block_in_space(dip, friction, azimuth=0.3):
     """A cube of 1 m on a plane through the origin, four contact points; motions x, y, z and turns
     about them. Axis 1 of the joint is z, axes 2 and 3 are turned by an azimuth in the plane."""
     law = jl.CoulombLaw(1e9, 6e8, friction)
-    weight, angle = 26e3, math.radians(dip)
+    weight = 26e3
+    angle = math.radians(dip)
     load = np.zeros((2, 6))
-    load[1, 0], load[1, 2] = weight * math.sin(angle), -weight * math.cos(angle)
+    load[1, 0] = weight * math.sin(angle)
+    load[1, 2] = -weight * math.cos(angle)
     normal = np.array([0.0, 0.0, 1.0])
     rough = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     axes = np.stack([normal, rough, np.cross(normal, rough)])
@@ -87,12 +90,12 @@ def block_in_space(dip, friction, azimuth=0.3):
 def test_a_block_in_space_stands_up_to_its_friction_angle(dip, verdict):
     """Six motions and three components of the law; without Newton's method."""
     problem, load = block_in_space(dip, math.tan(math.radians(35.0)))
-    found = problem.relax(np.zeros((2, 6)), lambda y: None)
-    assert found.verdict is Verdict[verdict]
-    if found.verdict is Verdict.EQUILIBRIUM:
-        assert np.abs(problem.unbalanced(found.y)).max() < 1e-10 * np.abs(load).max()
+    result = problem.relax(np.zeros((2, 6)), lambda y: None)
+    assert result.verdict is Verdict[verdict]
+    if result.verdict is Verdict.EQUILIBRIUM:
+        assert np.abs(problem.unbalanced(result.y)).max() < 1e-10 * np.abs(load).max()
     else:
-        x, y, z = found.growth[1, :3]
+        x, y, z = result.growth[1, :3]
         assert abs(y) < 1e-6 * x  # straight down the dip, whatever the azimuth of axis 2
         assert abs(z) < 1e-6 * x
 
@@ -113,13 +116,14 @@ def test_iterations_that_diverge_go_on_with_larger_masses(monkeypatch):
     scene = alone(load("slope"), "rough")
     expected = equilibrium_displacements(scene)
     monkeypatch.setattr(relaxation, "MASS_FACTOR", 0.028)
-    found = equilibrium_displacements(scene)
-    assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    result = equilibrium_displacements(scene)
+    assert result == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
 
 def arch(thickness, voussoirs, radius=5.0, friction=5.0):
     """A semicircular arch on fixed springings; thickness over radius."""
-    inner, outer = radius * (1 - thickness / 2), radius * (1 + thickness / 2)
+    inner = radius * (1 - thickness / 2)
+    outer = radius * (1 + thickness / 2)
     angles = np.linspace(0.0, math.pi, voussoirs + 1)
     text = "gravity = [0.0, -9.81]\n[laws.joint]\n" + coulomb(friction, 1e10, 1e10)
     points = [(np.array([math.cos(a), math.sin(a)])) for a in angles]

@@ -1,6 +1,7 @@
 """What a user gives the block demo: read as it is meant, or named where it is nonsense."""
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -16,6 +17,7 @@ import jointlaw as jl
 from dem_demo import load, parse
 from dem_demo.output import monitors
 from dem_demo.scene import TEMPLATE, Files, build, build_law, read_tables
+from dem_demo.scene.keys import SCENE
 from dem_demo.scene.read import SCENES
 from dem_demo.studies.strength import alone
 from jointlaw import PathError
@@ -353,3 +355,56 @@ def test_a_missing_package_is_told_in_one_line(tmp_path):
     assert done.returncode != 0
     assert "pip install 'jointlaw[demo]'" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "blocks.md").read_text(encoding="utf-8")
+INLINE = ("drive.reverse", "drive.sine")  # tables within a line: their keys are in the row
+
+
+def declared_keys(rules, path=""):
+    """Table and name of every declared key: ("rock.set", "dip"), a table itself too."""
+    for name, rule in rules.items():
+        key = name.removesuffix("!")
+        yield path, key
+        table = rule[0] if isinstance(rule, list) else rule
+        if isinstance(table, dict):
+            yield from declared_keys(table, f"{path}.{key}" if path else key)
+
+
+def documented_keys():
+    """Names in backticks in the first two cells of the rows, by the table of the first cell."""
+    rows = PAGE.partition("## The keys of a scene")[2].partition("\n## ")[0]
+    documented, tables = {}, []
+    for row in re.findall(r"^\|(.+)\|$", rows, re.MULTILINE)[2:]:
+        first, names, meaning = (cell.strip() for cell in row.split(" | ", 2))
+        if first.strip("| "):
+            tables = re.findall(r"\[+([a-zA-Z_.]+)\]+", first) or [""]
+        for table in tables:
+            documented.setdefault(table, set()).update(re.findall(r"`([a-z_0-9]+)", names))
+            for key in re.findall(r"`([a-z_]+)`", names):
+                inline = re.findall(r"`\{ ([a-z_, ]+) \}`", meaning)
+                documented[f"{table}.{key}"] = {one for part in inline for one in part.split(", ")}
+    return documented
+
+
+def test_every_key_of_a_scene_stands_on_its_page():
+    documented = documented_keys()
+    documented[""] |= {table.split(".")[0] for table in documented} | {"laws", "variants"}
+    for table in list(documented):
+        parent, _, name = table.rpartition(".")
+        if parent in documented:
+            documented[parent].add(name)
+    declared = {*declared_keys(SCENE)}
+    missing = {(table, key) for table, key in declared if key not in documented.get(table, ())}
+    assert missing == set()
+    assert {table for table, _ in declared} >= {"", "rock.set", "run", *INLINE}
+    extra_keys = {"from", "pressure", "kind"}  # of a law, which has no rules here
+    assert extra_keys <= documented["laws.NAME"]
+    known = {*declared, ("", "variant"), ("rock", "like"), ("rock", "set")}
+    unknown = {
+        (table, key)
+        for table in {table for table, _ in declared} - {"laws.NAME"}
+        for key in documented[table]
+        if table != "" and (table, key) not in known
+    }
+    assert unknown == set()

@@ -146,7 +146,8 @@ def _report(sim: Simulation, record: RunRecord, summary: dict, initial_dt: float
 def _describe(sim: Simulation, until: float | None = None, with_pictures: bool = True) -> None:
     """Print size, time step, estimated time, rocks and unstable blocks of a simulation."""
     scene = sim.scene
-    dt, limit = sim.dt, sim.limit.current
+    dt = sim.dt
+    limit = sim.limit.current
     steps = steps_to(sim, until)
     moving = sum(not block.fixed for block in scene.blocks)
     print(f"{scene.title}: {moving} moving blocks, {sim.joints.n} contact points")

@@ -114,8 +114,8 @@ def read_monitors(sim: Simulation) -> dict[str, float]:
 def _point_motion(sim: Simulation, block: int, point: tuple[float, float]) -> np.ndarray:
     """Position and velocity (4,) of the point of a block that was at `point` at first (m, m/s)."""
     x, y, angle, u, v, spin = sim.blocks.motion[:, block]
-    right, up = rotation(angle) @ (np.asarray(point) - sim.scene.blocks[block].centroid)
-    return np.array([x + right, y + up, u - spin * up, v + spin * right])
+    arm_x, arm_y = rotation(angle) @ (np.asarray(point) - sim.scene.blocks[block].centroid)
+    return np.array([x + arm_x, y + arm_y, u - spin * arm_y, v + spin * arm_x])
 
 
 def base_displacement(scene: Scene, motion: np.ndarray) -> np.ndarray:

@@ -85,7 +85,8 @@ class Pictures:
             shape for i in (0, -1)
             for block, shape in zip(blocks, outlines(record, i), strict=True) if block.moves
         ])  # fmt: skip
-        low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
+        low = np.nanmin(corners, axis=0)
+        high = np.nanmax(corners, axis=0)
         margin = MARGIN * (high - low).max()
         self.low = low - margin
         self.high = high + margin
@@ -214,7 +215,8 @@ class Pictures:
         """Draw the whole run as GIF, at a constant rate of model time."""
         count = len(self.record.times)
         frames = np.linspace(0, count - 1, min(count, MAX_FRAMES)).round().astype(int).tolist()
-        (figure, axes), writer = self.figure(), PillowWriter(FRAME_RATE)
+        figure, axes = self.figure()
+        writer = PillowWriter(FRAME_RATE)
         with writer.saving(figure, path, ANIMATION_DPI):
             for i in track(frames, "animation", len(frames)):
                 axes.clear()
@@ -244,7 +246,7 @@ class Pictures:
 
 @style()
 def curves(record: RunRecord, path: Path) -> None:
-    """Draw stress and dilation of the sheared joints against slip, and those of the law alone."""
+    """Draw stress and dilation of the sheared joints over slip, and curves of the law alone."""
     figure = Figure(figsize=(7, 7))
     upper, lower = figure.subplots(2, sharex=True)
     for moving, base in record.scene.shear:

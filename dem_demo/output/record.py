@@ -124,7 +124,8 @@ def format_blocks(blocks: list[dict]) -> str:
 
 def _read_joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Return the columns of `RunRecord.joints` for joints that touch or almost touch."""
-    contacts, joints = sim.contacts, sim.joints
+    contacts = sim.contacts
+    joints = sim.joints
     # A contact carries a part of the joint on each side of its corner; a length that neither side
     # carries is shared equally.
     part = contacts.overlap_length + 0.5 * (contacts.length - contacts.overlap_length.sum(axis=0))
@@ -155,7 +156,8 @@ def block_stresses(sim: Simulation) -> np.ndarray:
     It is the sum of contact force times arm over the volume of the block. NaN for blocks that other
     forces act on: fixed and driven ones, and blocks that in-situ stress loads from outside.
     """
-    contacts, blocks = sim.contacts, sim.scene.blocks
+    contacts = sim.contacts
+    blocks = sim.scene.blocks
     normal, shear = (sim.joints.traction * contacts.length[:, None]).T
     force_on_b = (normal + 1j * shear) * contacts.normal
     force = np.concatenate([force_on_b, -force_on_b])
@@ -235,8 +237,8 @@ def _groups(scene: Scene) -> dict[str, list[int]]:
     """Numbers of the free blocks of each rock, and of all other free blocks, by name."""
     groups = {rock.name: rock.free for rock in scene.rocks}
     free = {i for i, block in enumerate(scene.blocks) if not (block.fixed or block.prescribed)}
-    others = sorted(free.difference(*groups.values()))
-    groups["other blocks" if groups else "blocks"] = others
+    remaining = sorted(free.difference(*groups.values()))
+    groups["other blocks" if groups else "blocks"] = remaining
     return groups
 
 

@@ -106,7 +106,7 @@ def advance(
     Raises SceneError for a state that the method cannot continue from.
     """
     remaining = steps_to(sim, until)
-    taken = 0
+    step_count = 0
     dt = 0.0
     with tqdm(total=remaining, desc=sim.scene.title, disable=not sys.stderr.isatty()) as bar:
         while remaining:
@@ -117,7 +117,7 @@ def advance(
                 interval = max(round(min(sim.scene.run.record / dt, remaining + 1)), 1)
                 bar.reset(remaining)
             sim.step()
-            taken += 1
+            step_count += 1
             since_change += 1
             remaining -= 1
             bar.update()
@@ -125,7 +125,7 @@ def advance(
                 update_slip_monitors(record.slips, sim)
             if since_change % interval == 0 or remaining == 0:
                 record.add_frame(sim)
-                record.steps = taken
+                record.steps = step_count
                 if stop(record):
                     break
 
@@ -147,11 +147,12 @@ def run_to_failure(scene: Scene, until: float | None) -> tuple[RunRecord, str]:
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
-    """Number of steps to a model time (s), by default to the scene's end; zero if that is past.
+    """Number of steps to a model time (s), by default to the scene's end; zero if the end is past.
 
     Raises ValueError for a given time that is past, not finite, or more than MAX_STEPS away.
     """
-    now, dt = sim.time, sim.dt
+    now = sim.time
+    dt = sim.dt
     end = max(sim.scene.run.end, now) if until is None else until
     steps = (end - now) / dt
     if not -0.5 <= steps <= MAX_STEPS:

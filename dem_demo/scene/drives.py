@@ -88,12 +88,12 @@ class Drive:
 @cache
 def _reversed_drive(drive: Drive, time: float) -> Drive:
     """Return a drive that follows another one until a time (s) and its reversal from there on."""
-    kept = int(np.searchsorted(drive.times, time))
+    count = int(np.searchsorted(drive.times, time))
     present = float(np.interp(time, drive.times, drive.values))
     return replace(
         drive,
-        times=(*drive.times[:kept], time, time + drive.reverse["duration"]),
-        values=(*drive.values[:kept], present, present + drive.reverse["by"]),
+        times=(*drive.times[:count], time, time + drive.reverse["duration"]),
+        values=(*drive.values[:count], present, present + drive.reverse["by"]),
     )
 
 

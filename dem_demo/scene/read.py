@@ -361,11 +361,12 @@ def _rock(
         for edge, number in enumerate(sets_of_edges.tolist()):
             if number >= 0:
                 laws[first + i, edge] = law_of_set[number]
-    messages = [f"{pieces.merged} slivers merged with neighbours"]
+    messages = [f"slivers merged with neighbours: {pieces.merged}"]
     for sliver in pieces.dropped:
-        x, y = sliver.centroid.x + shift[0], sliver.centroid.y + shift[1]
+        x = sliver.centroid.x + shift[0]
+        y = sliver.centroid.y + shift[1]
         messages.append(f"a gap of {sliver.area:.2g} m2 at ({x:.3g}, {y:.3g}), a sliver left out")
     cuts = sum(int((numbers == INWARD_CUT).sum()) for numbers in pieces.edge_sets) // 2
     if cuts:
-        messages.append(f"{cuts} cuts at inward corners that are no joints: law {cut_law!r}")
+        messages.append(f"cuts at inward corners that are no joints: {cuts}, law {cut_law!r}")
     return Rock(name, range(first, len(blocks)), [], messages)

@@ -130,7 +130,7 @@ class Scene:
 
     @cached_property
     def skins(self) -> np.ndarray:
-        """Range (m) of contact detection of each block; that of a sliver is smaller."""
+        """Range (m) of contact detection of each block, smaller for slivers."""
         widths = np.array([block.width for block in self.blocks])
         skin = np.minimum(
             SKIN_PER_MEDIAN_WIDTH * median_width(self.blocks), MAX_SKIN_PER_WIDTH * widths

@@ -58,9 +58,9 @@ def ablate(scene: Scene, until: float | None = None) -> list[dict]:
         raise SceneError(whole["note"])
     rows = [whole]
     for name, build_variant in variants(scene, record):
-        row, other = _run(name, build_variant, until)
-        if other is not None:
-            distances = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
+        row, variant_record = _run(name, build_variant, until)
+        if variant_record is not None:
+            distances = np.hypot(*(variant_record.motion[-1] - record.motion[-1])[:2])
             row[DISTANCE] = 1e3 * float(np.nanmax(distances))
         rows.append(row)
     rows.append(_run("whole scene again", lambda: scene, until)[0])
@@ -88,8 +88,10 @@ def variants(scene: Scene, record: RunRecord) -> Iterator[tuple[str, Callable[[]
             f"resolution {name}": {"resolution": asdict(replace(law, resolution=name).resolution)}
             for name in ("fast", "fine")
         }
-        own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
-        removed_keys |= {name: keys for name, keys in candidates.items() if _differs(own, keys)}
+        law_keys = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
+        removed_keys |= {
+            name: keys for name, keys in candidates.items() if _differs(law_keys, keys)
+        }
     for name, keys in removed_keys.items():
         yield name, partial(_without, scene, keys, stresses)
     settings = scene.run
@@ -102,8 +104,8 @@ def variants(scene: Scene, record: RunRecord) -> Iterator[tuple[str, Callable[[]
         "twice the time step": {"step": 2.0 * dt},
     }
     for name, keys in run_variants.items():
-        if (other := replace(settings, **keys)) != settings:
-            yield name, partial(replace, scene, run=other)
+        if (variant := replace(settings, **keys)) != settings:
+            yield name, partial(replace, scene, run=variant)
 
 
 def _median_stresses(scene: Scene, record: RunRecord) -> dict[str, float]:
@@ -129,7 +131,7 @@ def _differs(own: dict[str, Any], keys: dict[str, Any]) -> bool:
 def _changed(part: Any, keys: dict[str, Any]) -> Any:
     """Return a law, or a part of it, with these keys."""
     nested = {key: getattr(part, key) for key, value in keys.items() if isinstance(value, dict)}
-    return replace(part, **keys | {k: own and _changed(own, keys[k]) for k, own in nested.items()})
+    return replace(part, **keys | {k: v and _changed(v, keys[k]) for k, v in nested.items()})
 
 
 def _without(scene: Scene, keys: dict[str, Any], stresses: dict[str, float]) -> Scene:

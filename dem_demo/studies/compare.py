@@ -80,7 +80,8 @@ def coulomb_of_same_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:
         normal=stress,
         steps=SHEAR_STEPS,
     )
-    friction, slip = record.shear_stress / stress, record.shear_2
+    friction = record.shear_stress / stress
+    slip = record.shear_2
     peak = int(friction.argmax())
     residual = float(friction[-1])
     drop = float(friction[peak] - residual)

@@ -95,7 +95,7 @@ def strength_reduction(
     continues. tell: called with each line of progress.
 
     Yields rows. `rock`: its name. `unstable`: names and centroids (m) of blocks without static
-    equilibrium. `excluded`: the same blocks, or if all blocks are unstable, only those that are
+    equilibrium. `excluded`: the same blocks, or if all blocks are unstable, only blocks that are
     unstable with twice the strength too. `factor_of_safety`: of all blocks.
     `factor_without_excluded`: of all other blocks, while the excluded ones move away, if some are
     excluded. `critical_tilt` (degrees). A number is None where none is found. `picture`: name of
@@ -244,7 +244,7 @@ def weakened(scene: Scene, factor: float) -> Scene:
 class _Search:
     """Search for the parameter x beyond which the scene `scene_at(x)` has no equilibrium.
 
-    Each trial looks for the displacements of an equilibrium, from those of a trial before it.
+    Each trial looks for the displacements of an equilibrium, starting at those of an earlier trial.
     trials: finished trials, under `name`. is_excluded (n,): blocks that need no equilibrium. As a
     context manager it shows progress.
     """
@@ -334,8 +334,8 @@ class _Search:
 def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
     """Build the scene of one of its rocks alone, without monitors.
 
-    seed: another seed than the rock's own. Of the `[[joint]]` tables those of this rock are kept;
-    tables that name its blocks only with its own seed, because another seed gives other blocks.
+    seed: another seed than the rock's own. `[[joint]]` tables of this rock are kept; tables
+    that name its blocks are kept only with its own seed, because another seed gives other blocks.
     """
     data = read_tables(scene.text)
     rock = next(table for table in data["rock"] if table["name"] == name)

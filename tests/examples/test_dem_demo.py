@@ -1,5 +1,4 @@
-"""Runs: their files, what refuses or stops them, and how they go on from a saved state, whole and
-anywhere."""
+"""Runs: their files, errors and interrupts, and the restart from a saved state."""
 
 import itertools
 import json
@@ -67,19 +66,20 @@ def test_run_writes_everything(tmp_path):
     assert len(first.split(",")) == len(header.split(","))
 
 
-def test_joints_are_drawn_as_wide_as_they_bear():
+def test_line_width_of_a_joint_is_proportional_to_its_normal_stress():
     record, _ = run(Simulation(parse(SHORT)), None, 0.02)
-    pictures, borne = Pictures(record), record.joints[-1]["normal_stress_Pa"]
+    pictures = Pictures(record)
+    stresses = record.joints[-1]["normal_stress_Pa"]
     _, axes = pictures.figure()
     pictures.draw(axes, -1)
-    lines = [drawn for drawn in axes.collections if isinstance(drawn, LineCollection)]
+    lines = [artist for artist in axes.collections if isinstance(artist, LineCollection)]
     widths = np.concatenate([line.get_linewidths() for line in lines if len(line.get_segments())])
-    wide = np.interp(borne, [0.0, 1.2 * pictures.stress], [0.7, 3.1])
-    assert sorted(widths) == pytest.approx(sorted(wide))
-    assert wide.max() > 2.0
+    expected = np.interp(stresses, [0.0, 1.2 * pictures.stress], [0.7, 3.1])
+    assert sorted(widths) == pytest.approx(sorted(expected))
+    assert expected.max() > 2.0
 
 
-def test_vtk_files_hold_what_the_record_holds(tmp_path):
+def test_vtk_files_have_the_numbers_of_the_record(tmp_path):
     sim = Simulation(parse(SHORT))
     record, _ = run(sim, tmp_path, 0.02, pictures=None, vtk=True)
     for kind in ("blocks", "joints"):
@@ -93,8 +93,8 @@ def test_vtk_files_hold_what_the_record_holds(tmp_path):
     for name in ("closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa", "sliding"):
         np.testing.assert_array_equal(joints.cell_data[name][0], record.joints[-1][name])
     assert set(joints.cell_data["state"][0]) <= {0, 1, 2, 3}
-    mine = (np.sort(record.joints[-1]["blocks"]) == [0, 1]).all(axis=1)
-    x = record.joints[-1]["ends"][mine][:, :, 0]  # of the joint below a block of 1 m
+    is_base_joint = (np.sort(record.joints[-1]["blocks"]) == [0, 1]).all(axis=1)
+    x = record.joints[-1]["ends"][is_base_joint][:, :, 0]  # of the joint below a block of 1 m
     assert [x.min(), x.max(), np.ptp(x, axis=1).sum()] == pytest.approx([-0.5, 0.5, 1.0], abs=1e-3)
     number = np.concatenate(blocks.cell_data["block"]).astype(int)
     largest, vector = (
@@ -123,26 +123,29 @@ record = 0.02
 """
 
 
-def test_fixed_rock_is_driven_and_a_block_on_it_told_relative_to_it(tmp_path):
-    """Newton: after a ramp of 0.05 s the joint bears mass times 0.2 g, and the block rides along.
+def test_history_points_are_relative_to_driven_fixed_rock(tmp_path):
+    """Newton's second law: after a ramp of 0.05 s the joint carries mass times 0.2 g, and the block
+    moves with the rock, because its friction is 0.3.
 
-    1e-3: vibrations from the ramp, which dashpots damp; friction 0.3 holds it.
+    Tolerance 1e-3: vibrations from the ramp, which dashpots damp.
     """
     (tmp_path / "motion.csv").write_text("Time (s),Acc (g)\n0.0,0.0\n0.05,0.2\n0.3,0.2\n")
     (tmp_path / "scene.toml").write_text(SHAKEN)
-    scene, a = load(tmp_path / "scene.toml"), 0.2 * 9.80665
+    scene = load(tmp_path / "scene.toml")
+    a = 0.2 * 9.80665  # m/s2
     record, _ = run(Simulation(scene), tmp_path / "out", pictures=None)
-    last, weight = record.readings[-1], 2600 * 0.5  # kg/m2
-    known = {
-        "joint 1: normal_Pa": pytest.approx(weight * 9.81, rel=1e-3),
+    last = record.readings[-1]
+    mass = 2600 * 0.5  # kg/m2
+    expected = {
+        "joint 1: normal_Pa": pytest.approx(mass * 9.81, rel=1e-3),
         "base: vx_m/s": pytest.approx(a * (record.times[-1] - 0.025), rel=1e-2),
         "base: x_m": pytest.approx(a * 0.275**2 / 2, rel=1e-2),
         "point 1: x_m": pytest.approx(-0.9, abs=1e-5),  # 2.5 kPa on springs of 1 GPa/m
         "point 1: y_m": pytest.approx(0.4, abs=1e-4),
         "point 1: vx_m/s": pytest.approx(0.0, abs=1e-3 * last["base: vx_m/s"]),
     }
-    assert {name: last[name] for name in known} == known
-    assert abs(last["joint 1: shear_Pa"]) == pytest.approx(weight * a, rel=1e-3)
+    assert {name: last[name] for name in expected} == expected
+    assert abs(last["joint 1: shear_Pa"]) == pytest.approx(mass * a, rel=1e-3)
     assert record.distances.max() < 1e-5
     header, *_ = (tmp_path / "out" / "history.csv").read_text().splitlines()
     assert set(last) <= set(header.split(","))
@@ -152,34 +155,36 @@ def test_fixed_rock_is_driven_and_a_block_on_it_told_relative_to_it(tmp_path):
 @pytest.mark.parametrize("name", shipped())
 def test_scenes_are_valid(name, capsys):
     assert main(["check", name]) == 0
-    said = capsys.readouterr()
-    assert "margin" in said.out
-    assert " for figures and animation" in said.out
-    assert "warning" not in said.err
+    printed = capsys.readouterr()
+    assert "stability limit" in printed.out
+    assert " for figures and animation" in printed.out
+    assert "the scene is valid" in printed.out
+    assert "warning" not in printed.err
 
 
-def test_a_run_stopped_by_ctrl_c_goes_on_bit_for_bit(tmp_path, capsys, monkeypatch):
+def test_resuming_a_run_stopped_by_ctrl_c_is_bitwise_reproducible(tmp_path, capsys, monkeypatch):
     text = SHORT.replace("end = 0.12", "end = 0.02").replace("record = 0.02", "record = 0.002")
     (tmp_path / "scene.toml").write_text(text)
     words = ["scene.toml", "--no-pictures", "--out"]
     assert main([*words, "whole"]) == 0
     assert not list((tmp_path / "whole").glob("*.png"))
-    step, count = Simulation.step, itertools.count(1)
+    step = Simulation.step
+    count = itertools.count(1)
 
-    def pressed(self):
+    def interrupted_step(self):
         step(self)
-        if next(count) == TRIAL_STEPS + 37:  # the first ones tell how long the run will take
+        if next(count) == TRIAL_STEPS + 37:  # TRIAL_STEPS are for the estimate of the time
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(Simulation, "step", pressed)
+        patch.setattr(Simulation, "step", interrupted_step)
         assert main([*words, "part"]) == 130
-    told = capsys.readouterr().err.splitlines()[-1]
-    assert told.startswith("dem_demo: interrupted; resume from ")
+    message = capsys.readouterr().err.splitlines()[-1]
+    assert message.startswith("dem_demo: interrupted; resume from ")
     summary = json.loads((tmp_path / "part" / "summary.json").read_text())
     assert summary["stopped"] == "interrupted"
     assert 0 < summary["steps"] <= 37  # to the last frame
-    resume = told.split("python -m dem_demo ")[1].replace("NEW", "end").split()
+    resume = message.split("python -m dem_demo ")[1].replace("NEW", "end").split()
     assert main([*resume, "--no-pictures"]) == 0
     whole, end = (np.load(tmp_path / name / "state" / "state.npz") for name in ("whole", "end"))
     np.testing.assert_equal(dict(end), dict(whole))
@@ -214,9 +219,11 @@ step = STEP
     ids=["overlap", "step", "speed"],
 )
 def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, speed, step, why):
-    """By command, for each kind of failure: refused, then resumed to the end of the scene."""
+    """Each kind of error stops a run; the command that resumes it reaches the end."""
     text = DROP.replace("HEIGHT", str(height)).replace("SPEED", str(speed))
-    file, out, more = tmp_path / "scene.toml", tmp_path / "out", tmp_path / "more"
+    file = tmp_path / "scene.toml"
+    out = tmp_path / "out"
+    more = tmp_path / "more"
     file.write_text(text.replace("STEP", str(step)))
     assert main([str(file), "--no-pictures", "--out", str(out)]) == 2
     assert re.search(f"{why}.*{out / 'last_valid_state'}", capsys.readouterr().err)
@@ -233,29 +240,30 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
 
 
 def test_history_survives_a_gap():
-    """A joint that opens for less than the reach of the search is the same joint afterwards."""
+    """A joint that opens by less than the range of contact detection keeps its history."""
     sim = Simulation(parse(SHORT.replace("velocity = [0.0, 0.1]", "velocity = [0.0, 0.3]")))
-    keys, places = sim.manager.edge_pairs, sim.joints.place.copy()
-    opened = False
+    edge_pairs = sim.manager.edge_pairs
+    places = sim.joints.place.copy()
+    has_opened = False
     for _ in range(600):
         sim.step()
-        opened |= bool((sim.joints.traction[sim.manager.between(1, 2), 0] == 0).all())
-    assert opened
-    assert sim.manager.edge_pairs is keys  # the list of contacts never changed
+        has_opened |= bool((sim.joints.traction[sim.manager.between(1, 2), 0] == 0).all())
+    assert has_opened
+    assert sim.manager.edge_pairs is edge_pairs  # the list of contacts never changed
     assert (sim.joints.place == places).all()
 
 
 BOND = "bond = { normal_stiffness = 1e9, shear_stiffness = 1e9, tension = 1e4, cohesion = 1e5 }\n"
 
 
-def test_what_meets_in_a_run_has_no_bond():
-    """Pulled by a micrometre, joints of the start hold by their bond; new ones are free."""
+def test_contacts_that_form_in_a_run_have_no_bond():
+    """Opened by a micrometre, joints of the start carry tension by their bond; new ones do not."""
     sim = Simulation(parse(f"[laws.rock]\n{ROCK}{BOND}{BASE}{ONE}[run]\nend = 0.1\n"))
-    for started, held in ((False, -1e3), (True, 0.0)):
+    for has_started, stress in ((False, -1e3), (True, 0.0)):
         new = np.full(sim.joints.n, -1)
-        sim.joints.rearrange(new, sim.manager.law, sim.manager.edge_pairs, started)
+        sim.joints.rearrange(new, sim.manager.law, sim.manager.edge_pairs, has_started)
         F, _, _ = sim.joints.trial(np.tile([-1e-6, 0.0], (sim.joints.n, 1)))
-        assert F[:, 0] == pytest.approx(held)
+        assert F[:, 0] == pytest.approx(stress)
 
 
 TEXT = f"""
@@ -288,7 +296,7 @@ file = "motion.csv"
 
 
 def test_files_are_found_beside_their_scene_and_kept_in_the_state(tmp_path, monkeypatch):
-    """A record and a law, relative to the scene; a state goes on without them, from anywhere."""
+    """A record and a law are found relative to the scene; a saved state contains them."""
     home = tmp_path / "home"
     home.mkdir()
     monkeypatch.chdir("/")
@@ -301,8 +309,8 @@ def test_files_are_found_beside_their_scene_and_kept_in_the_state(tmp_path, monk
     assert sim.scene.drives[0].times == (0.0, 0.1)
     sim.save(tmp_path / "state")
     rmtree(home)
-    again = advanced(Simulation.load(tmp_path / "state"), 20)
-    assert (again.blocks.motion == advanced(sim, 20).blocks.motion).all()
+    resumed = advanced(Simulation.load(tmp_path / "state"), 20)
+    assert (resumed.blocks.motion == advanced(sim, 20).blocks.motion).all()
 
 
 def test_a_scene_changed_in_memory_is_not_saved(tmp_path):
@@ -339,8 +347,8 @@ end = 0.1
 """
 
 
-def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
-    """Blocks with a set on each side: edge 0 of both, their bottoms, would give "bedding" twice."""
+def test_a_monitored_joint_has_the_law_of_the_facing_edges():
+    """Blocks with a set on each side: the laws of edge 0, the bottom, would be "bedding" twice."""
     record = RunRecord(Simulation(parse(CUT)))
     (slip,) = record.slips.values()
     assert slip["law"] == "bedding"
@@ -352,11 +360,12 @@ def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
     "damage", ["", pytest.param(", yield_interference = 2e-4", marks=pytest.mark.slow)]
 )
 def test_resume_is_bit_identical(tmp_path, damage):
-    """Stop and go on from files, in the middle of impacts and renewed contacts."""
+    """Save and resume amid impacts and rebuilds of the neighbour list."""
     text = TEXT.replace("mu = 0.4", f"mu = 0.4{damage}").replace("-0.05]", "-0.3]")
     advanced(Simulation(parse(text)), 170).save(tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
-    again, whole = advanced(Simulation.load(tmp_path), 230), advanced(Simulation(parse(text)), 400)
+    resumed = advanced(Simulation.load(tmp_path), 230)
+    whole = advanced(Simulation(parse(text)), 400)
     for name in (
         "blocks.motion",
         "joints.traction",
@@ -364,26 +373,27 @@ def test_resume_is_bit_identical(tmp_path, damage):
         "energy_balance.value",
         "limit.lowest",
     ):
-        np.testing.assert_equal(*(attrgetter(name)(sim) for sim in (again, whole)))
-    batch = again.joints.by_law[again.joints.law_names.index("rock/rough")].pool.batch
+        np.testing.assert_equal(*(attrgetter(name)(sim) for sim in (resumed, whole)))
+    batch = resumed.joints.by_law[resumed.joints.law_names.index("rock/rough")].pool.batch
     assert bool(damage) == (batch.plastic_work.max() > 0.0)
-    # also the one that goes on tells how far blocks have moved since step 0
-    np.testing.assert_array_equal(RunRecord(again).distances, RunRecord(whole).distances)
-    assert RunRecord(again).distances.max() > 1e-3
+    # displacements of the resumed run are relative to step 0 too
+    np.testing.assert_array_equal(RunRecord(resumed).distances, RunRecord(whole).distances)
+    assert RunRecord(resumed).distances.max() > 1e-3
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
 def test_a_damaged_file_or_another_version_is_refused(tmp_path):
     advanced(Simulation(parse(TEXT)), 3).save(tmp_path)
     file = tmp_path / "state.npz"
-    whole, arrays = file.read_bytes(), dict(np.load(file))
+    whole = file.read_bytes()
+    arrays = dict(np.load(file))
     damaged = r"state\.npz is damaged .*run the scene again"
-    lacking = {key: value for key, value in arrays.items() if key != "states-1"}
-    for write, told in (
+    incomplete = {key: value for key, value in arrays.items() if key != "states-1"}
+    for write, message in (
         (lambda: file.write_bytes(whole[: len(whole) // 2]), damaged),
         (lambda: file.write_bytes(b""), damaged),
         (lambda: file.write_bytes(whole[:2000] + bytes([whole[2000] ^ 1]) + whole[2001:]), damaged),
-        (lambda: np.savez(file, **lacking), damaged),
+        (lambda: np.savez(file, **incomplete), damaged),
         (
             lambda: np.savez(file, **{**arrays, "version": 3}),
             "version 3, this demo reads 10: go on",
@@ -391,14 +401,15 @@ def test_a_damaged_file_or_another_version_is_refused(tmp_path):
         (file.unlink, r"holds no saved state: state\.npz is missing"),
     ):
         write()
-        with pytest.raises(ValueError, match=told):
+        with pytest.raises(ValueError, match=message):
             Simulation.load(tmp_path)
 
 
-def test_a_state_that_is_refused_changes_nothing():
-    """A joint that the state lacks would be virgin again, without a word; so would a bad step."""
+def test_an_invalid_state_changes_nothing():
+    """A joint that the state lacks would silently be virgin again."""
     sim = advanced(Simulation(parse(TEXT)), 5)
-    state, limit = sim.state(), sim.limit.current
+    state = sim.state()
+    limit = sim.limit.current
     state["states-0"] = state["states-0"][:, :-1]
     with pytest.raises(ValueError, match="not those of the scene's laws and contacts"):
         Simulation(sim.scene, saved=state)

@@ -1,4 +1,4 @@
-"""What a user gives the block demo: read as it is meant, or named where it is nonsense."""
+"""Input of the block demo: it is read as intended, and errors name the invalid value."""
 
 import os
 import re
@@ -181,7 +181,7 @@ WRONG_ROCKS = [
         (FLAT, "seed = 7", "sead = 7", "sead' is unknown; did you mean 'seed'"),
     ],
 )
-def test_nonsense_is_named(text, old, new, message):
+def test_errors_name_the_invalid_value(text, old, new, message):
     assert old in text
     with pytest.raises(ValueError, match=message):
         parse(text.replace(old, new, 1), "scene.toml")
@@ -194,8 +194,9 @@ def test_lists_of_tables_hold_tables(table):
 
 
 def test_a_variant_changes_what_it_names():
-    """Tables key by key, lists of tables in order, all else as it stands."""
-    scene, flat = read_tables(ROCKS + VARIANT), read_tables(FLAT)
+    """Tables are overlaid key by key, lists of tables in order; all other keys stay."""
+    scene = read_tables(ROCKS + VARIANT)
+    flat = read_tables(FLAT)
     assert flat["title"] == "Flat"
     assert flat["laws"]["joint"] == {**scene["laws"]["joint"], "mating_length": 1e-3}
     (rock,) = flat["rock"]
@@ -205,7 +206,7 @@ def test_a_variant_changes_what_it_names():
     assert {key for key in scene if flat[key] != scene[key]} == {"title", "laws", "rock"}
 
 
-def test_a_file_that_is_no_text_is_named(tmp_path):
+def test_an_error_names_a_file_that_is_no_text(tmp_path):
     (tmp_path / "scene.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ValueError, match=r"scene\.toml is not UTF-8 text"):
         load(tmp_path / "scene.toml")
@@ -230,7 +231,7 @@ MOTION = "time_s,acceleration_m/s2\n0.0,1.0\n0.1,1.0\n0.2,-1.0\n"
         (None, "cannot be read"),
     ],
 )
-def test_a_bad_record_is_refused_by_its_line(tmp_path, text, message):
+def test_an_error_names_the_invalid_line_of_a_record(tmp_path, text, message):
     if text is not None:
         (tmp_path / "motion.csv").write_text(text)
     shaken = TEXT.replace(LINES, 'file = "motion.csv"\nscale = 2.0')
@@ -239,14 +240,14 @@ def test_a_bad_record_is_refused_by_its_line(tmp_path, text, message):
 
 
 def driven(folder, record, keys=""):
-    """The drive of a block by a record, with these further keys."""
+    """Drive that moves a block along a record; keys: further lines of its table."""
     (folder / "motion.csv").write_text(record)
     text = TEXT.replace(LINES, f'file = "motion.csv"\n{keys}')
     return next(d for d in parse(text, files=Files(folder)).drives if len(d.times) > 1)
 
 
-def test_a_motion_by_lines_is_rounded_over_its_ease():
-    """1 mm in 0.1 s, averaged over the last 0.04 s, or over 0.1 s if nothing is said."""
+def test_a_motion_by_points_is_averaged_over_its_ramp():
+    """1 mm in 0.1 s, averaged over the last 0.04 s, or by default over 0.1 s."""
     for keys, ramp in (("ramp = 0.04", 0.04), ("", 0.1)):
         *_, drive = parse(TEXT.replace(LINES, f"{LINES}\n{keys}")).drives
         assert drive(0.5 * ramp) == pytest.approx(1e-2 * 0.125 * ramp)
@@ -257,29 +258,30 @@ def test_a_motion_by_lines_is_rounded_over_its_ease():
     ("titles", "unit", "order"),
     [("Time (s),Acc (g)", 9.80665, 2), ('"t [s]","v [cm/s]"', 0.01, 1), ("time_s,a_m/s^2", 1.0, 2)],
 )
-def test_the_unit_says_what_a_record_holds(tmp_path, titles, unit, order):
+def test_the_unit_decides_the_derivative_of_a_record(tmp_path, titles, unit, order):
     drive = driven(tmp_path, f"{titles}\n0.0,0.0\n0.1,2.0\n")
     assert (drive.order, drive.values) == (order, (0.0, 2.0 * unit))
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_base_correction_ends_at_rest_and_takes_drift_away(tmp_path, order):
-    """A line in acceleration, a parabola in velocity: what is left does not depend on it."""
+def test_base_correction_ends_at_rest_and_removes_drift(tmp_path, order):
+    """Drift, a line in acceleration or a parabola in velocity, does not change the result."""
     s = np.linspace(0.0, 2.0, 101)
-    pulse, left = np.where(s < 1, np.sin(2 * np.pi * s) ** 3, 0.0) + 0.2 * s, []
+    pulse = np.where(s < 1, np.sin(2 * np.pi * s) ** 3, 0.0) + 0.2 * s
+    corrected = []
     for drift in (0.0, 0.3 * s ** (2 - order) - 0.4 * s ** (3 - order)):
         table = np.column_stack([1.0 + s, pulse + drift]).tolist()
         rows = [f"time_s,of_{'m/s' if order == 1 else 'm/s2'}", *(f"{t},{v}" for t, v in table)]
         drive = driven(tmp_path, "\n".join(rows), "baseline = true")
         assert [drive.path(3.0, nu=1), drive.path(3.0)] == pytest.approx([0.0, 0.0], abs=1e-13)
-        left.append(drive.values)
-    assert np.ptp(left[0]) > 0.5  # the pulse stays
-    np.testing.assert_allclose(*left, atol=1e-13)
+        corrected.append(drive.values)
+    assert np.ptp(corrected[0]) > 0.5  # the pulse is kept
+    np.testing.assert_allclose(*corrected, atol=1e-13)
 
 
 TENTHS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]  # s
-# the integral of the record, doubled by `scale`; and the integral of that, 5 s**3/6 while it rises,
-# then a parabola, then a line
+# the integral of the record, doubled by `scale`; and its own integral: 5 s**3/6 while the record
+# rises, then a parabola, then a line
 MOVED = [0.0, 0.0, 0.025, 0.1, 0.2, 0.3, 0.4]
 ACCELERATED = [
     0.0,
@@ -304,20 +306,21 @@ RISE = "\n0.1,0.0\n0.3,0.5\n0.5,0.5\n"
     ],
 )
 def test_a_record_moves_its_block(tmp_path, record, scale, times, exact):
-    """Straight lines between accelerations, or velocities, by hand; then at constant velocity."""
+    """Closed forms for linear interpolation; after the record the velocity is constant."""
     drive = driven(tmp_path, record, f"scale = {scale}")
     np.testing.assert_allclose([drive(at) for at in times], exact, atol=1e-15)
 
 
 def test_a_law_by_name_and_the_keys_that_replace_its_own():
-    given = jl.presets.load("westerly-rough")
+    preset = jl.presets.load("westerly-rough")
     law = build_law({"from": "westerly-rough", "asperity": {"mu": 0.5}}, "law", Files())
-    assert law == replace(given, plane=0.0, asperity=replace(given.asperity, mu=0.5))
+    assert law == replace(preset, plane=0.0, asperity=replace(preset.asperity, mu=0.5))
 
 
-def test_an_angle_that_is_not_found_is_given_up(monkeypatch):
-    """Two angles in turn, for ever: no fixed point to predict; and a law that fails on its path."""
-    scene, angles = parse(TEXT), iter(10_000 * [20.0, 40.0])
+def test_a_prediction_without_a_fixed_point_is_none(monkeypatch):
+    """Friction angles that alternate have no fixed point; a law may also fail on its path."""
+    scene = parse(TEXT)
+    angles = iter(10_000 * [20.0, 40.0])
     monkeypatch.setattr(monitors, "friction_angle", lambda law, stress: next(angles))
     assert monitors.predict_slip(scene, "rock", 1, 1.0)["predicted_angle"] is None
 
@@ -326,35 +329,35 @@ def test_an_angle_that_is_not_found_is_given_up(monkeypatch):
 
 
 def test_a_rock_alone_keeps_its_joints():
-    """Those that name its blocks only with its own seed: with another there are other blocks."""
+    """Joints that name its blocks are kept only with its own seed: another gives other blocks."""
     joint = '[[joint]]\nlaw = "rough"\nbetween = ["{}", "{}"]\n'
     pairs = [("rough 1", "rough 2"), ("smooth 1", "smooth 2"), ("wall", "rough 1")]
     wall = '[[block]]\nname = "wall"\nbox = [1.0, 1.0]\nat = [-50.0, 0.0]\n'
     text = (SCENES / "slope.toml").read_text()
     scene = parse(text + wall + "".join(joint.format(*pair) for pair in pairs))
-    for seed, kept in ((None, {(1, 2), (0, 1)}), (2, set())):
-        assert {tuple(sorted(pair)) for pair in alone(scene, "rough", seed).pairs} == kept
+    for seed, pairs in ((None, {(1, 2), (0, 1)}), (2, set())):
+        assert {tuple(sorted(pair)) for pair in alone(scene, "rough", seed).pairs} == pairs
 
 
 @pytest.mark.parametrize("first", range(4))
-def test_a_rock_alone_keeps_what_is_taken_from_it(first):
-    """Wherever the corners begin, also where they reach beyond the rock."""
+def test_a_rock_alone_keeps_its_excavation_stages(first):
+    """With each first corner of the stage; its corners may lie outside the rock."""
     corners = np.roll([[9.0, -9.0], [13.0, -9.0], [13.0, 0.0], [9.0, 0.0]], first, axis=0)
-    dig = "[[excavate]]\nrelease_time = 0.1\ncorners = "
-    given = parse((SCENES / "tunnel.toml").read_text() + f"{dig}{corners.tolist()}\n")
-    assert len(given.stages) == len(alone(given, "rock").stages) == 3
+    stage = f"[[excavate]]\nrelease_time = 0.1\ncorners = {corners.tolist()}\n"
+    scene = parse((SCENES / "tunnel.toml").read_text() + stage)
+    assert len(scene.stages) == len(alone(scene, "rock").stages) == 3
 
 
-def test_a_missing_package_is_told_in_one_line(tmp_path):
+def test_one_line_names_a_missing_package(tmp_path):
     (tmp_path / "pymunk.py").write_text("raise ModuleNotFoundError('No module named pymunk')\n")
     path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
-    done = subprocess.run(
+    finished = subprocess.run(
         [sys.executable, "-m", "dem_demo"], env={**os.environ, "PYTHONPATH": path}, cwd=tmp_path,
         capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode != 0
-    assert "pip install 'jointlaw[demo]'" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    assert finished.returncode != 0
+    assert "pip install 'jointlaw[demo]'" in finished.stderr
+    assert len(finished.stderr.splitlines()) == 1
 
 
 PAGE = (Path(__file__).parents[2] / "docs" / "blocks.md").read_text(encoding="utf-8")
@@ -374,7 +377,8 @@ def declared_keys(rules, path=""):
 def documented_keys():
     """Names in backticks in the first two cells of the rows, by the table of the first cell."""
     rows = PAGE.partition("## The keys of a scene")[2].partition("\n## ")[0]
-    documented, tables = {}, []
+    documented = {}
+    tables = []
     for row in re.findall(r"^\|(.+)\|$", rows, re.MULTILINE)[2:]:
         first, names, meaning = (cell.strip() for cell in row.split(" | ", 2))
         if first.strip("| "):
@@ -383,11 +387,11 @@ def documented_keys():
             documented.setdefault(table, set()).update(re.findall(r"`([a-z_0-9]+)", names))
             for key in re.findall(r"`([a-z_]+)`", names):
                 inline = re.findall(r"`\{ ([a-z_, ]+) \}`", meaning)
-                documented[f"{table}.{key}"] = {one for part in inline for one in part.split(", ")}
+                documented[f"{table}.{key}"] = {k for part in inline for k in part.split(", ")}
     return documented
 
 
-def test_every_key_of_a_scene_stands_on_its_page():
+def test_every_key_of_a_scene_is_on_its_page():
     documented = documented_keys()
     documented[""] |= {table.split(".")[0] for table in documented} | {"laws", "variants"}
     for table in list(documented):
@@ -400,11 +404,11 @@ def test_every_key_of_a_scene_stands_on_its_page():
     assert {table for table, _ in declared} >= {"", "rock.set", "run", *INLINE}
     extra_keys = {"from", "pressure", "kind"}  # of a law, which has no rules here
     assert extra_keys <= documented["laws.NAME"]
-    known = {*declared, ("", "variant"), ("rock", "like"), ("rock", "set")}
-    unknown = {
+    read_elsewhere = {("", "variant"), ("rock", "like")}  # by `read_tables`
+    undeclared = {
         (table, key)
         for table in {table for table, _ in declared} - {"laws.NAME"}
         for key in documented[table]
-        if table != "" and (table, key) not in known
+        if table != "" and (table, key) not in declared | read_elsewhere
     }
-    assert unknown == set()
+    assert undeclared == set()

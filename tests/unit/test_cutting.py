@@ -50,8 +50,8 @@ def test_persistence_is_the_share_of_length_that_is_a_joint():
     outline = SQUARE * [8.0, 4.0]
     sets = [JointSet(0.0, 1.0, "bed"), JointSet(90.0, 1.0, "cross", persistence=0.3)]
     blocks, _edge_sets, _merged, _dropped = cut(outline, sets, seed=5, min_width=0.1)
-    share = (len(blocks) - 40) / (40 * 79)
-    assert share == pytest.approx(0.3, abs=3 * np.sqrt(0.3 * 0.7 / (40 * 79)))  # three sigma
+    fraction = (len(blocks) - 40) / (40 * 79)
+    assert fraction == pytest.approx(0.3, abs=3 * np.sqrt(0.3 * 0.7 / (40 * 79)))  # three sigma
     assert len(cut(outline, [sets[0]], 5, 0.1)[0]) == 40
 
 

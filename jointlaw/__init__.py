@@ -86,8 +86,8 @@ __all__ = [
     "tabulate",
 ]
 
-# Tools for measurements and hosts load on first use: a DEM code that embeds the law needs none
-_LATER = {
+# Modules for measurements and hosts are imported on first use: a host of the law needs none
+_LAZY_MODULES = {
     "ClosureCurve": "calibration.measured",
     "ShearCurve": "calibration.measured",
     "fit_curves": "calibration.fit",
@@ -99,8 +99,8 @@ _LATER = {
 
 
 def __getattr__(name: str) -> Any:
-    if name in _LATER:
-        return getattr(import_module(f".{_LATER[name]}", __name__), name)
+    if name in _LAZY_MODULES:
+        return getattr(import_module(f".{_LAZY_MODULES[name]}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -26,7 +26,7 @@ class Clay(jl.Element):
         C[1, 1] = np.where(np.abs(trial) < self.strength, self.shear, 0.0)
         return jl.ElementResponse(np.stack([0.0 * trial, new[0]]), lost, C)
 
-    def stored(self, delta, state):
+    def stored_energy(self, delta, state):
         return 0.5 * state[0] ** 2 / self.shear
 
     def stiffness(self, delta, state):

@@ -81,14 +81,14 @@ class LawJoints:
         all_shown = np.zeros((places, len(MEASURES) + 2))
         all_F[: len(F)] = F
         all_shown[: len(shown)] = shown
-        self.step = jl.Step(d, all_F, None, shown=all_shown)
+        self.step = jl.Step(d, all_F, None, measures=all_shown)
         self.silent_step = jl.Step(d, all_F, None)
 
     def allocate(self, m: int) -> np.ndarray:
         """Places (m,) for new contacts."""
         places = self.pool.allocate(m)
         if len(self.pool.batch) > len(self.step.d):
-            self._make_steps(self.step.F, self.step.shown)
+            self._make_steps(self.step.F, self.step.measures)
         return places
 
     def release(self, places: np.ndarray) -> None:
@@ -106,12 +106,12 @@ class LawJoints:
         batch = self.pool.batch
         batch.reset(places, mated)
         if not bonded:
-            batch.unbond(places)
+            batch.break_bond(places)
         measures = np.zeros((len(places), len(MEASURES)))
         measures[:, MEASURES.index("separated")] = 1.0
         measures[:, MEASURES.index("damage")] = batch.damage[places]
         self.step.F[places] = 0.0
-        self.step.shown[places] = np.column_stack([measures, np.tile(start, (len(places), 1))])
+        self.step.measures[places] = np.column_stack([measures, np.tile(start, (len(places), 1))])
         return start
 
     def restore(self, state: jl.JointState) -> np.ndarray:
@@ -122,7 +122,7 @@ class LawJoints:
         batch.restore(state)
         measures = batch.measures()[:4]
         self.step.F[:] = batch.F
-        self.step.shown[:] = np.column_stack(
+        self.step.measures[:] = np.column_stack(
             [*measures, batch.dissipated_energy, batch.damage, batch.delta]
         )
         return places
@@ -130,7 +130,7 @@ class LawJoints:
     def arrays(self) -> LawJointArrays:
         """Addresses of the arrays for the compiled step."""
         stress = self.curve["stress"]
-        arrays = self.step.d, self.step.F, self.step.shown, stress, self.curve["stiffness"]
+        arrays = self.step.d, self.step.F, self.step.measures, stress, self.curve["stiffness"]
         bears_tension = self.law.tensile_opening > 0.0
         return LawJointArrays(*map(address, arrays), len(stress), bears_tension)
 
@@ -211,7 +211,7 @@ class Joints:
         continues = np.isin(edge_pairs[new_rows] @ pair_as_number, mated_pairs) | (not started)
         for i, joints in enumerate(self.by_law):
             joints.release(self.place[has_ended & (self.law == i)])
-            is_mated = continues | (not joints.law.tables.fades)
+            is_mated = continues | (not joints.law.tables.interlock_decays)
             for mated in (True, False):
                 rows = new_rows[(law[new_rows] == i) & (is_mated == mated)]
                 if len(rows):
@@ -238,7 +238,7 @@ class Joints:
         for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
             if len(rows):
                 for step in [joints.silent_step] * (law_steps - 1) + [joints.step]:
-                    joints.pool.batch.take(step)
+                    joints.pool.batch.advance(step)
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Trial step by increments d (k, 2) in m; the state of the joints is unchanged.
@@ -255,13 +255,13 @@ class Joints:
                 np.empty((m, 2)),
                 np.empty((m, 2, 2)),
                 where=self.place[rows],
-                keep=False,
-                shown=np.empty((m, len(MEASURES) + 2)),
+                commit=False,
+                measures=np.empty((m, len(MEASURES) + 2)),
             )
-            joints.pool.batch.take(step)
+            joints.pool.batch.advance(step)
             F[rows] = step.F
             C[rows] = step.C
-            stored_energy[rows] = step.shown[:, MEASURES.index("stored_energy")]
+            stored_energy[rows] = step.measures[:, MEASURES.index("stored_energy")]
         return F / self.reduction, C / np.outer(self.reduction, self.reduction), stored_energy
 
     def stick_predictor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

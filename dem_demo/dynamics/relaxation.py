@@ -126,10 +126,10 @@ class Relaxation:
     def _law_step(self, law: jl.Law, contact: np.ndarray) -> tuple[Any, jl.Step, np.ndarray]:
         """A batch of virgin joints for these contact points (m,), and a step that leaves it so."""
         m, dim = len(contact), self.start.shape[1]
-        batch = law.joints(m, ledger=False)
-        step = jl.Step(np.zeros((m, dim)), np.zeros((m, dim)), None, keep=False)
+        batch = law.joints(m, track_dissipation=False)
+        step = jl.Step(np.zeros((m, dim)), np.zeros((m, dim)), None, commit=False)
         if m:
-            batch.take(step)  # prepares the call of the library
+            batch.advance(step)  # prepares the call of the library
         return batch, step, contact
 
     def _law_arrays(self, batch: Any, step: jl.Step, contact: np.ndarray) -> RelaxedLaw:
@@ -166,7 +166,7 @@ class Relaxation:
 
         def advance(_batch: int, _operation: int) -> int:
             try:
-                batch.take(step)
+                batch.advance(step)
             except jl.NonFiniteError:
                 step.F[:] = np.nan
             except Exception as error:  # C cannot pass it on: `_call` raises it

@@ -8,7 +8,7 @@ library is built with the package, where numpy may be missing.
 import ctypes
 from typing import NamedTuple
 
-# Columns of the law's measures for one joint, in the order of `jl.Step.shown`
+# Columns of the law's measures for one joint, in the order of `jl.Step.measures`
 MEASURES = ("sliding", "slipping", "separated", "stored_energy", "dissipated_energy", "damage")
 ENERGIES = (
     "kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned",

@@ -141,7 +141,7 @@ def _read_joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
 def slip_distance(law: jl.Law) -> float:
     """Slip (m) that counts as failure of a joint: the mating length of its law."""
     asperities = law.tables.asperities
-    has_mating_length = asperities is not None and asperities.fades
+    has_mating_length = asperities is not None and asperities.interlock_decays
     return asperities.mating_length if has_mating_length else DEFAULT_SLIP_DISTANCE
 
 

@@ -105,7 +105,7 @@ def _copy_rocks(rocks: Any, where: str) -> Iterator[Tables]:
 def build(data: Tables, where: str = "scene", files: Files | None = None, text: str = "") -> Scene:
     """Build a scene from the tables of its file and the files that it names. Raises ValueError."""
     files = Files() if files is None else files
-    top = DEFAULTS | keys.checked(data, SCENE, where)
+    top = DEFAULTS | keys.validate_table(data, SCENE, where)
     laws = {
         name: build_law(table, f"{where}: laws.{name}", files)
         for name, table in top["laws"].items()

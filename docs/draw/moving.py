@@ -15,10 +15,10 @@ from command_line import output_folder
 from PIL import Image
 
 import jointlaw as jl
-from jointlaw.kernels.asperities import at_limit, effective_closure, strength
-from jointlaw.kernels.cells import cells
-from jointlaw.kernels.mating import planes
-from jointlaw.kernels.reference import parts
+from jointlaw.kernels.asperities import effective_closure, friction_limit, is_at_limit
+from jointlaw.kernels.cells import evaluate_cells
+from jointlaw.kernels.interlock import planes
+from jointlaw.kernels.reference import state_parts
 from jointlaw.support.pyplot import style
 
 NORMAL_STRESS = 10e6  # Pa
@@ -72,7 +72,7 @@ def choose_faces(law):
         side = sides[tooth % 2]
         chosen.append(side[(2 * (tooth // 2) + tooth // 4) % len(side)])
     facet = np.array(chosen)
-    gaps = facets.c1[facet, None] * facets.depth[facet, :-1]
+    gaps = facets.c1[facet, None] * facets.cell_depth[facet, :-1]
     touching_cells = np.sum(gaps < 1.5 * law.closure(NORMAL_STRESS), axis=1)
     teeth = np.arange(TEETH)
     cell = (3 * teeth + teeth // 2) % np.maximum(touching_cells, 1)
@@ -83,12 +83,14 @@ def face_colours(joint, faces):
     """Colour of each face by its state."""
     facets = joint.law.tables.asperities
     chosen = faces.facet, faces.cell
-    state = parts(joint.law.tables, joint.snapshot().values.T)
-    cell_states = cells(facets, effective_closure(facets, state.delta, state.slopes))
-    limit = strength(facets, planes(facets, state.delta[1:], state.slopes).gamma)
-    slides = at_limit(np.hypot(*state.q), limit, cell_states.G, cell_states.force)
+    state = state_parts(joint.law.tables, joint.snapshot().values.T)
+    cell_states = evaluate_cells(
+        facets, effective_closure(facets, state.delta, state.slope_retention)
+    )
+    limit = friction_limit(facets, planes(facets, state.delta[1:], state.slope_retention).gamma)
+    slides = is_at_limit(np.hypot(*state.q), limit, cell_states.G, cell_states.force)
     slides = slides[:, :, 0][chosen]
-    touches = (cell_states.y > facets.depth[:, :-1])[chosen]
+    touches = (cell_states.y > facets.cell_depth[:, :-1])[chosen]
     contact_colours = np.where(slides, SLIDING_COLOUR, STUCK_COLOUR)
     return np.where(touches, contact_colours, SEPARATED_COLOUR)
 

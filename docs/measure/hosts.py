@@ -26,7 +26,7 @@ import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
 from jointlaw.hosts.lammps.export import export_lammps
 from jointlaw.hosts.yade.export import export_yade
-from jointlaw.parameters.resolution import NAMED
+from jointlaw.parameters.resolution import NAMED_RESOLUTIONS
 
 ENVIRONMENT = Path(os.environ.get("ENV", sys.prefix))
 RESOLUTIONS = "fast", "balanced", "fine"
@@ -452,7 +452,7 @@ def yade_times(law, kinds, contacts, runs):
         raise SystemExit("YADE is not installed (Debian: apt-get install yade)")
     with tempfile.TemporaryDirectory() as folder:
         export_yade(law, folder)
-        for resolution in set(kinds) & set(NAMED):
+        for resolution in set(kinds) & set(NAMED_RESOLUTIONS):
             replace(law, resolution=resolution).to_toml(Path(folder) / f"{resolution}.toml")
         overlap = 0.2 * law.closure_range
         scene = YADE_SCENE.format(contacts=contacts, runs=runs, kinds=kinds, overlap=overlap)

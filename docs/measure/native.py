@@ -80,7 +80,7 @@ def updates(cc="cc", rounds=60):
         folder = Path(name)
         libraries = {
             "C": timing_library(folder, cc),
-            "no ledger": timing_library(folder, cc, "-DJOINTLAW_NO_DISSIPATION"),
+            "no dissipation": timing_library(folder, cc, "-DJOINTLAW_NO_DISSIPATION"),
             "many": timing_library(folder, cc, "-DJOINTLAW_MANY"),
         }
         for resolution in ("fast", "balanced", "fine"):
@@ -121,7 +121,7 @@ def update_times(law, libraries, file, rounds):
     def in_c(name, tangent):
         library = libraries[name]
         steps = cycle(increments)
-        batch = law.joints(BATCH_SIZE, ledger=False)
+        batch = law.joints(BATCH_SIZE, track_dissipation=False)
         batch.update(closing, tangent=False)
         states = batch.snapshot().values.copy()
         c_law = ctypes.c_void_p(library.jlaw_read(str(file).encode(), None, 0))
@@ -129,20 +129,20 @@ def update_times(law, libraries, file, rounds):
         return lambda: update(c_law, states.ctypes.data, next(steps).ctypes.data, BATCH_SIZE,
                               tangent)  # fmt: skip
 
-    def in_python(ledger, tangent):
-        batch = law.joints(BATCH_SIZE, ledger=ledger)
+    def in_python(track_dissipation, tangent):
+        batch = law.joints(BATCH_SIZE, track_dissipation=track_dissipation)
         batch.update(closing, tangent=False)
         return partial(batch_time, batch, cycle(increments), time.thread_time, "1", tangent)
 
     cases = {
-        "C F, no ledger": in_c("no ledger", False),
+        "C F, no dissipation": in_c("no dissipation", False),
         "C F": in_c("C", False),
         "C FC": in_c("C", True),
         "many F": in_c("many", False),
         "many FC": in_c("many", True),
         "batch F": in_python(False, False),
-        "batch F + ledger": in_python(True, False),
-        "batch FC + ledger": in_python(True, True),
+        "batch F + dissipation": in_python(True, False),
+        "batch FC + dissipation": in_python(True, True),
     }
     return shortest_times(cases, rounds)
 
@@ -165,7 +165,7 @@ def batch_size(rounds=60):
         cells = []
         for plane in PLANES.values():
             law = replace(jl.presets.load("westerly-smooth"), resolution="balanced", plane=plane)
-            batch = law.joints(n, ledger=False)
+            batch = law.joints(n, track_dissipation=False)
             increment = np.random.default_rng(1).normal(0.0, 2e-8, (n, law.dim))
             batch.update(increment + 1e-6 * np.eye(law.dim)[0], tangent=False)
             steps = increment, -increment

@@ -20,7 +20,7 @@ import dem_demo
 import jointlaw as jl
 from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tolerance import EXCURSIONS
-from jointlaw.parameters.resolution import NAMED
+from jointlaw.parameters.resolution import NAMED_RESOLUTIONS
 
 # the law of the studies of one plane and, with other orientations, of reduced models
 ANISOTROPIC = jl.JointLaw(
@@ -41,18 +41,18 @@ def named():
 
     Motion in one plane, on the standard paths and the random paths of `at_tolerance`.
     """
-    sliders = dict.fromkeys(NAMED, 0)
+    sliders = dict.fromkeys(NAMED_RESOLUTIONS, 0)
     rows = []
     for preset in jl.presets.names():
         law = replace(jl.presets.load(preset), plane=0.0)
         suite = standard_suite(law, excursions=EXCURSIONS)
         errors = []
-        for name, resolution in NAMED.items():
+        for name, resolution in NAMED_RESOLUTIONS.items():
             variant = replace(law, resolution=resolution)
             sliders[name] = max(sliders[name], variant.tables.sliders)
             errors.append(f"{100 * suite.errors(variant).traction.max():.2f}")
         rows.append([preset, *errors])
-    print_table(["preset", *NAMED], [*rows, ["sliders, at most", *sliders.values()]])
+    print_table(["preset", *NAMED_RESOLUTIONS], [*rows, ["sliders, at most", *sliders.values()]])
 
 
 def cost_list():
@@ -151,18 +151,19 @@ def reduced_models(rounds=6, seconds=0.1):
     linear = replace(plane, asperity=replace(plane.asperity, eta=0.0))
     with_c = replace(space, orientation=jl.Orientation(3.0, 0.5, 0.1))
 
-    def case(law, n=10_000, tangent=False, ledger=False):
-        return law, n, tangent, ledger
+    def case(law, n=10_000, tangent=False, track_dissipation=False):
+        return law, n, tangent, track_dissipation
 
     pairs = {
         "one `Joint` by Python, in a batch (tangent, dissipated energy)": (
-            case(plane, n=1, tangent=True, ledger=True), case(plane, tangent=True, ledger=True),
+            case(plane, n=1, tangent=True, track_dissipation=True),
+            case(plane, tangent=True, track_dissipation=True),
         ),
         "no tangent (3-D, with dissipated energy)": (
-            case(space, tangent=True, ledger=True), case(space, ledger=True),
+            case(space, tangent=True, track_dissipation=True), case(space, track_dissipation=True),
         ),
         "no tangent (one plane)": (case(plane, tangent=True), case(plane)),
-        "no dissipated energy (one plane)": (case(plane, ledger=True), case(plane)),
+        "no dissipated energy (one plane)": (case(plane, track_dissipation=True), case(plane)),
         "motion in one plane, of 3-D": (case(space), case(plane)),
         "closure only, of 3-D": (case(space), case(closure)),
         "closure only, of one plane": (case(plane), case(closure)),
@@ -186,7 +187,7 @@ def reduced_models(rounds=6, seconds=0.1):
                 rows)  # fmt: skip
 
 
-def update_time(law, n, tangent, ledger, seconds):
+def update_time(law, n, tangent, track_dissipation, seconds):
     """Shortest time (ns) per joint of an update during so many seconds.
 
     n: joints; a single joint is a `Joint`, more are a batch.
@@ -203,7 +204,7 @@ def update_time(law, n, tangent, ledger, seconds):
         closing = closing[0]
         increments = increments[:, 0]
     else:
-        joints = law.joints(n, ledger=ledger)
+        joints = law.joints(n, track_dissipation=track_dissipation)
         calls = 1
     joints.update(closing, tangent=False)
     steps = cycle(increments)

@@ -89,7 +89,7 @@ def run_slip_tests(law: JointLaw, closure_range: float, stress: float, tests: Ar
     psi = np.radians(azimuth)
     direction = np.stack([np.cos(psi), np.sin(psi)], axis=-1)[:, : dim - 1]
     normal = stress * stress_fraction
-    batch = law.joints(len(normal), ledger=False, normal_stress=normal)
+    batch = law.joints(len(normal), track_dissipation=False, normal_stress=normal)
     F = np.empty((2 * STEPS_PER_LEG, len(normal), dim))
     tan_dilation = np.empty(F.shape[:2])
     closing_rate = np.zeros(len(normal))  # first guess of closure over slip

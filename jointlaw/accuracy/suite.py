@@ -165,7 +165,7 @@ def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: in
 
 def tractions(law: JointLaw, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
-    batch = law.joints(d.shape[1], ledger=False)
+    batch = law.joints(d.shape[1], track_dissipation=False)
     F = np.empty_like(d)
     for k, step in enumerate(track(d, "steps of the paths", len(d))):
         F[k], _ = batch.update(step, tangent=False)
@@ -305,7 +305,7 @@ def _control_stress(law: JointLaw, d: Array, at_constant_stress: Array, stress: 
     d = d.copy()
     selected = np.flatnonzero(at_constant_stress)
     condition = NormalCondition(stress, stress)
-    batch = law.joints(len(selected), ledger=False)
+    batch = law.joints(len(selected), track_dissipation=False)
     for k in range(len(d)):
         step = d[k, selected]
         if k >= STEPS // 10:

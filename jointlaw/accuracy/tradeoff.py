@@ -8,7 +8,7 @@ from timeit import Timer
 import numpy as np
 
 from ..kernels.threads import thread_count
-from ..parameters.resolution import Resolution, named, resolve
+from ..parameters.resolution import Resolution, named_resolutions, resolve
 from ..support.checks import Array, integer
 from ..support.progress import track
 from .slip import JointLaw
@@ -115,7 +115,7 @@ def tradeoff(
     """See `JointLaw.tradeoff`."""
     joints = integer("joints", joints, 0)
     lengths = law.mating_length, law.asperity.yield_interference, law.closure_range
-    names = named(*lengths)
+    names = named_resolutions(*lengths)
     if resolutions is None:
         resolutions = (*DEFAULT_RESOLUTIONS, *names.values())
     unique = {resolve(r, *lengths) for r in resolutions}
@@ -150,7 +150,7 @@ def _time_update(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
     if n == 0:
         return float("nan")
     n = min(n, max(MAX_TIMING_MEMORY // (8 * law.tables.rows), 1))
-    batch = law.joints(n, ledger=False)
+    batch = law.joints(n, track_dissipation=False)
     dim = law.tables.dim
     rng = np.random.default_rng(0)
     steps = rng.normal(0.0, 0.1 * law.closure_range, (3, n, dim))

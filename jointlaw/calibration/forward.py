@@ -8,9 +8,9 @@ import numpy as np
 from scipy import special
 
 from ..discretisation.facets import facets
-from ..discretisation.first_loading import facet_sum, yield_sum
-from ..discretisation.virgin_curve import exact_force
-from ..laws.joint_law import SHORTEST, JointLaw
+from ..discretisation.first_loading_curve import exact_force
+from ..discretisation.first_loading_response import correct_for_yielding, sum_facets
+from ..laws.joint_law import MIN_MATING_LENGTH, JointLaw
 from ..parameters.bond import MODES, Bond
 from ..parameters.declared import parameters_of
 from ..parameters.heights import GammaHeights, HeightDistribution
@@ -93,7 +93,7 @@ def build_law(values: Values, settings: Settings, plane: float | None = None) ->
     )
     if math.isinf(values["mating_length"]):
         return interlocked
-    min_mating_length = SHORTEST * interlocked.closure_range
+    min_mating_length = MIN_MATING_LENGTH * interlocked.closure_range
     return replace(
         interlocked,
         **options,
@@ -139,8 +139,8 @@ def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
     nodes = facets(orientation, resolution.u, resolution.phi, closure_only=True)
     scale = nodes.scale(p, values["asperity_density"])
     force = _first_loading_force(closure, p.eta, heights)
-    stress = facet_sum(nodes.theta, scale, p.lam, p.mu) * force
-    yielding = yield_sum(nodes.theta, scale, p)
+    stress = sum_facets(nodes.theta, scale, p.lam, p.mu) * force
+    yielding = correct_for_yielding(nodes.theta, scale, p)
     if yielding is not None:
         weight, yield_closure = yielding
         max_closure = np.maximum.accumulate(closure)[:, None]

@@ -60,7 +60,7 @@ def simulate_shear(law: JointLaw, paths: Sequence[ShearPath]) -> list[SimulatedT
     rows = max(path.shear.size for path in paths)
     shear = np.stack([_padded(path.shear, rows) for path in paths], -1)
     normal = np.stack([_padded(path.normal, rows) for path in paths], -1)
-    joints = law.joints(len(paths), ledger=False)
+    joints = law.joints(len(paths), track_dissipation=False)
     scale = normal.max(axis=0)
     increments = np.diff(shear, axis=0, prepend=0.0)
     step = np.zeros((len(paths), 2))

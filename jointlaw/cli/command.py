@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from .. import presets
 from ..laws.joint_law import JointLaw
 from ..parameters import keys
-from ..parameters.resolution import NAMED
+from ..parameters.resolution import NAMED_RESOLUTIONS
 from ..parameters.rock import ROCK, require_rock
 from ..support import units
 from ..support.files import SUMMARY, clear_run, replace_file, write_json
@@ -82,7 +82,7 @@ LAW = (  # read by `read_law`
     ),
     option(
         "--resolution",
-        choices=tuple(NAMED),
+        choices=tuple(NAMED_RESOLUTIONS),
         help="number of springs and sliders (default: that of the preset or file)",
     ),
 )

@@ -1,4 +1,4 @@
-"""Facets: the few orientations that stand for the density of Eq. 14, and sums over them."""
+"""Facets: the quadrature nodes of the orientation density of Eq. 14, and sums over them."""
 
 import math
 from dataclasses import dataclass
@@ -16,11 +16,12 @@ from .nodes import azimuths, inclinations
 class Facets:
     """Quadrature nodes of the orientation density, as arrays over the facets (M,).
 
-    `n`, `s`, `t` (dim, M) are the facet normal and the two in-facet directions of Eq. 25; dim is 3,
-    2 (closure, shear along the plane) for motion in one plane, or 1 for closure alone. `weight`
-    sums to 1. `share` (0 to 1) is the share of the depth cells that a facet needs: as the third
-    root of its weight, for then a cell more lowers the error of every facet by as much.
-    `opposite` is the facet of the same inclination that faces the other way.
+    theta, phi: inclination and azimuth (rad); weight: of the quadrature, sums to 1. n, s, t (dim,
+    M): facet normal and the two in-facet directions of Eq. 25; dim is 3, 2 (closure, shear along
+    the plane) for motion in one plane, or 1 for closure alone. cell_fraction (0 to 1): number of
+    cells relative to the facet of largest weight, the third root of the weight: then one more cell
+    decreases the error of every facet by the same amount. opposite: index of the facet of the same
+    inclination with the opposite azimuth.
     """
 
     theta: Array
@@ -29,7 +30,7 @@ class Facets:
     n: Array
     s: Array
     t: Array
-    share: Array
+    cell_fraction: Array
     opposite: NDArray[np.intp]
 
     def scale(self, asperity: Asperity, asperity_density: float) -> Array:
@@ -48,50 +49,59 @@ def facets(
 ) -> Facets:
     """Quadrature nodes: rings of one inclination each, with evenly spaced azimuths from 0 on.
 
-    `u` rings, `phi` intervals of azimuth on the half circle of the longest (`nodes`). With `plane`
-    None the whole circle is covered by twice as many azimuths; with a plane at that azimuth (rad)
-    the half circle measured from it suffices, c being replaced by c cos(2 plane): mirror images
-    across it share one motion. A facet then stands at 0 and at pi, in the plane itself, with half
-    the weight of a pair. With `closure_only` all azimuths share one motion, and one stands for
-    them: c sums to zero.
+    orientation: the density; u: number of rings; phi: intervals of azimuth on the half circle of
+    the steepest ring (`azimuths`); plane: azimuth (rad) of the plane of motion, None in 3-D;
+    closure_only: for closure alone.
+
+    Without a plane the whole circle has twice as many azimuths. In a plane the half circle measured
+    from it suffices, with c replaced by c cos(2 plane), because mirror images across the plane have
+    the same motion; the facets at 0 and pi, in the plane itself, then have half the weight of a
+    pair. For closure alone all azimuths have the same motion, and one represents them: c sums to
+    zero.
     """
-    cos_a, share = inclinations(orientation.b, u)
-    b, c = orientation.b, orientation.c
+    cos_a, ring_weight = inclinations(orientation.b, u)
+    b = orientation.b
+    c = orientation.c
     if plane is not None:
         c *= math.cos(2 * plane)
-    numbers = azimuths(u, phi)
+    azimuth_counts = azimuths(u, phi)
     if closure_only:
-        c, rings = 0.0, [(np.zeros(1), np.ones(1))] * u
+        c = 0.0
+        rings = [(np.zeros(1), np.ones(1))] * u
     else:
-        rings = [_ring(m, full=plane is None) for m in numbers]
-    P, even = (np.concatenate(part) for part in zip(*rings, strict=True))
+        rings = [_ring(m, is_full=plane is None) for m in azimuth_counts]
+    P, fraction = (np.concatenate(part) for part in zip(*rings, strict=True))
     counts = [len(azimuth) for azimuth, _ in rings]
     U = np.repeat(cos_a, counts)
-    # no more than 1 by Eq. 18, but for rounding where the density is zero
-    lean = np.clip(3 * c * (1 - U**2) / shape(U, b), -1.0, 1.0)
-    weight = np.repeat(share, counts) * even * (1 + lean * np.cos(2 * P))
+    # <= 1 by Eq. 18, but for rounding where the density is zero
+    anisotropy = np.clip(3 * c * (1 - U**2) / shape(U, b), -1.0, 1.0)
+    weight = np.repeat(ring_weight, counts) * fraction * (1 + anisotropy * np.cos(2 * P))
     theta = np.arccos(U) / orientation.a
-    ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(P), np.sin(P)
+    ct = np.cos(theta)
+    st = np.sin(theta)
+    cp = np.cos(P)
+    sp = np.sin(P)
     zero = np.zeros_like(ct)
     n = np.array([ct, st * cp, st * sp])
     s = np.array([-st, ct * cp, ct * sp])
     t = np.array([zero, -sp, cp])
     dim = 1 if closure_only else 3 if plane is None else 2
-    each = share / numbers
-    depth = np.repeat(np.cbrt(each / each.max()), counts)
+    facet_weight = ring_weight / azimuth_counts
+    cell_fraction = np.repeat(np.cbrt(facet_weight / facet_weight.max()), counts)
     first = np.cumsum([0, *counts[:-1]])
-    turned = [
-        np.roll(np.arange(n), n // 2) if plane is None else np.arange(n)[::-1] for n in counts
+    opposite_in_ring = [
+        np.roll(np.arange(m), m // 2) if plane is None else np.arange(m)[::-1] for m in counts
     ]
-    opposite = np.concatenate([k + ring for k, ring in zip(first, turned, strict=True)])
-    arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim], depth, opposite)
+    opposite = np.concatenate([i + ring for i, ring in zip(first, opposite_in_ring, strict=True)])
+    weight = np.maximum(weight, 0.0)
+    arrays = (theta, P, weight, n[:dim], s[:dim], t[:dim], cell_fraction, opposite)
     return Facets(*read_only(arrays))
 
 
-def _ring(m: int, full: bool) -> tuple[Array, Array]:
-    """Azimuths and shares of a full ring of 2 m facets, or of the m + 1 of its half circle."""
-    azimuth = np.arange(2.0 * m if full else m + 1.0) * (math.pi / m)
-    even = np.full_like(azimuth, (0.5 if full else 1.0) / m)
-    if not full:
-        even[[0, -1]] /= 2.0
-    return azimuth, even
+def _ring(m: int, is_full: bool) -> tuple[Array, Array]:
+    """Azimuths and weights of a full ring of 2 m facets, or of m + 1 facets of a half circle."""
+    azimuth = np.arange(2.0 * m if is_full else m + 1.0) * (math.pi / m)
+    weight = np.full_like(azimuth, (0.5 if is_full else 1.0) / m)
+    if not is_full:
+        weight[[0, -1]] /= 2.0
+    return azimuth, weight

@@ -1,4 +1,4 @@
-"""The tables of facets: all that a kernel reads of the asperities of a law."""
+"""Tables of facets: everything that a kernel reads of the asperities of a law."""
 
 import math
 from dataclasses import dataclass, replace
@@ -8,37 +8,36 @@ import numpy as np
 from ..parameters.asperity import Asperity
 from ..support.checks import Array, read_only
 from .facets import Facets
-from .nodes import UNUSED, depth_nodes
-from .virgin_curve import VirginCurve
+from .first_loading_curve import FirstLoadingCurve
+from .nodes import UNUSED, cell_limits
 
-VERSION = 3  # of the discretisation: a change of nodes or state changes it, old states are refused
-_OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
+VERSION = 3  # of the discretisation: increase it with a change of nodes or states
+_MAX_NUMBER = 1e140  # Pa and J/m2: squares of larger numbers overflow
 
 
 @dataclass(frozen=True, eq=False)
 class FacetTables(Facets):
-    """Everything per facet (M facets, D depth cells), physical axes first, of the mated joint.
+    """Tables of M facets with D cells for the interlocked position, physical axes first.
 
-    `m` (dim, M) maps closure and offset to the effective closure y of a facet, `azimuth` (2, M) is
-    the unit vector of the facet's azimuth and `steep` (M,) its tan(theta),
-    `area` is A = N w lam K c1^(1+eta),
-    `depth` (M, D+1) the cell limits zeta with the virgin force and slope there (slope 0 at the
-    first by definition).
-    A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
-    `yield_depth` (M,) is the yield interference along y, infinite if asperities do not yield;
-    `opposite` (M,) names the facet that shares its flattened depth, each itself if none does.
+    m (dim, M): maps closure and offset to the effective closure y of a facet. azimuth (2, M): unit
+    vector of its azimuth. tan_theta (M,): its slope. c1 (M,): cos(theta). area (M,): A = N w lam K
+    c1^(1+eta). cell_depth (M, D + 1): cell limits zeta in m; cell_force and cell_slope: Phi and
+    Phi' there, the slope at the first limit 0 by definition. A facet with fewer cells has its
+    limits first; cells that begin at UNUSED stay empty. yield_depth (M,): yield interference along
+    y, infinite if asperities do not yield. opposite (M,): the facet that shares the plastic
+    indentation, the facet itself if none does.
     """
 
-    curve: VirginCurve
+    curve: FirstLoadingCurve
     asperity: Asperity
     m: Array
     azimuth: Array
-    steep: Array
+    tan_theta: Array
     c1: Array
     area: Array
-    depth: Array
-    depth_force: Array
-    depth_slope: Array
+    cell_depth: Array
+    cell_force: Array
+    cell_slope: Array
     mating_length: float
     yield_depth: Array
     slope_wear: float
@@ -59,17 +58,17 @@ class FacetTables(Facets):
 
     @property
     def yields(self) -> bool:
-        """Whether asperities yield."""
+        """Whether asperities are elastic-perfectly plastic."""
         return bool(self.yield_depth[0] < math.inf)
 
     @property
-    def fades(self) -> bool:
-        """Whether slopes fade with the distance from the mated position."""
+    def interlock_decays(self) -> bool:
+        """Whether the interlock decays with slip, over the mating length."""
         return self.mating_length < math.inf
 
     @property
-    def wears(self) -> bool:
-        """Whether slopes wear by the work of friction."""
+    def degrades(self) -> bool:
+        """Whether asperities degrade by the work of shear."""
         return self.slope_wear < math.inf
 
     @property
@@ -79,18 +78,18 @@ class FacetTables(Facets):
 
     @property
     def cells(self) -> int:
-        """Depth cells of the facet that has most of them."""
-        return int(self.depth.shape[1]) - 1
+        """Largest number of cells of a facet."""
+        return int(self.cell_depth.shape[1]) - 1
 
     @property
     def sliders(self) -> int:
-        """Sliders per joint: one for each cell of each facet."""
-        return int(np.count_nonzero(self.depth[:, :-1] < UNUSED))
+        """Number of sliders per joint: one for each cell of each facet."""
+        return int(np.count_nonzero(self.cell_depth[:, :-1] < UNUSED))
 
 
 def facet_tables(
     facets: Facets,
-    curve: VirginCurve,
+    curve: FirstLoadingCurve,
     asperity: Asperity,
     asperity_density: float,
     closure_range: float,
@@ -100,14 +99,19 @@ def facet_tables(
     slope_residual: float,
     lowest: float,
 ) -> FacetTables:
-    """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
-    c1, slope = np.cos(facets.theta), np.tan(facets.theta)
-    share = np.zeros_like(facets.share) if curve.linear else facets.share
-    several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
-    depth = depth_nodes(curve, closure_range, slope, several, lowest)
-    force, bend = _at_limits(curve, depth)
-    # slopes that change need one flattened depth for both sides of an asperity, else it creates
-    # energy; with others each side has its own
+    """Tables of these facets, with the parameters of a law.
+
+    cells: number of cells of the facet of largest weight; every facet has one if the curve is
+    linear.
+    """
+    c1 = np.cos(facets.theta)
+    slope = np.tan(facets.theta)
+    fraction = np.zeros_like(facets.cell_fraction) if curve.is_linear else facets.cell_fraction
+    cell_counts = np.maximum(np.rint(cells * fraction), 1).astype(np.intp)
+    cell_depth = cell_limits(curve, closure_range, slope, cell_counts, lowest)
+    cell_force, cell_slope = _curve_at_limits(curve, cell_depth)
+    # if slopes change, both sides of an asperity must have one plastic indentation, or energy is
+    # created; if not, each side has its own
     if math.isinf(mating_length):
         facets = replace(facets, opposite=np.arange(len(c1)))
     return FacetTables(
@@ -116,12 +120,12 @@ def facet_tables(
         asperity=asperity,
         m=facets.n / c1,
         azimuth=np.stack([np.cos(facets.phi), np.sin(facets.phi)]),
-        steep=slope,
+        tan_theta=slope,
         c1=c1,
         area=facets.scale(asperity, asperity_density),
-        depth=depth,
-        depth_force=force,
-        depth_slope=bend,
+        cell_depth=cell_depth,
+        cell_force=cell_force,
+        cell_slope=cell_slope,
         mating_length=mating_length,
         yield_depth=asperity.yield_interference / c1,
         slope_wear=slope_wear,
@@ -129,26 +133,30 @@ def facet_tables(
     )
 
 
-def _at_limits(curve: VirginCurve, depth: Array) -> tuple[Array, Array]:
-    """Virgin force and slope at the cell limits (M, D + 1)."""
-    force, slope = curve.force(np.where(depth < UNUSED, depth, 0.0))
-    force = np.where(depth < UNUSED, force, depth)
-    slope = np.where(depth < UNUSED, slope, depth)
-    slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
-    return force, np.maximum.accumulate(slope, axis=1)  # it rises, but for rounding
+def _curve_at_limits(curve: FirstLoadingCurve, cell_depth: Array) -> tuple[Array, Array]:
+    """First-loading force and slope at the cell limits (M, D + 1)."""
+    is_used = cell_depth < UNUSED
+    force, slope = curve.force(np.where(is_used, cell_depth, 0.0))
+    force = np.where(is_used, force, cell_depth)
+    slope = np.where(is_used, slope, cell_depth)
+    slope[:, 0] = 0.0  # a spring that engages at zero (eta = 0) belongs to the first cell
+    return force, np.maximum.accumulate(slope, axis=1)  # increasing, but for rounding
 
 
-def largest_reach(curve: VirginCurve, scale: Array, theta: Array, asperity: Asperity) -> float:
+def max_effective_closure(
+    curve: FirstLoadingCurve, scale: Array, theta: Array, asperity: Asperity
+) -> float:
     """Effective closure (m) up to which forces, energies and their squares stay finite.
 
     scale, theta: A and inclination of every facet (M,).
     """
-    y, p = 10.0 ** np.arange(-300.0, 101.0), asperity
+    p = asperity
+    y = 10.0 ** np.arange(-300.0, 101.0)
     stiffest = float(np.max(scale / np.cos(theta))) * max(p.lam, 1 / p.lam, 1.0) * (1.0 + p.mu)
     with np.errstate(over="ignore", invalid="ignore"):
         force, slope = curve.force(y)
-        worst = stiffest * (force + y * slope) + float(np.max(scale)) * curve.energy(y)
-    bad = ~(worst < _OVERFLOW)
-    if bad[0]:
+        largest = stiffest * (force + y * slope) + float(np.max(scale)) * curve.energy(y)
+    overflows = ~(largest < _MAX_NUMBER)
+    if overflows[0]:
         return 0.0
-    return float(y[int(np.argmax(bad)) - 1]) if bad.any() else float(y[-1])
+    return float(y[int(np.argmax(overflows)) - 1]) if overflows.any() else float(y[-1])

@@ -1,4 +1,4 @@
-"""The closure increment at which a normal condition holds: Newton's method kept in a bracket."""
+"""Closure increments that meet a normal condition: Newton's method, safeguarded by a bracket."""
 
 from typing import NamedTuple
 
@@ -8,14 +8,16 @@ from ..support.checks import Array
 from .batch import JointBatch
 
 TOLERANCE = 1e-11  # of the normal stress scale
-_TRIES = 200
-_ROUNDING = 4e-16  # of the closure: what rounding leaves of it
+_MAX_ITERATIONS = 200
+_RELATIVE_RESOLUTION = 4e-16  # of the closure: rounding
 
 
 class NormalCondition(NamedTuple):
-    """Normal condition F1 = stress + spring (seat - closure), met to a share of `scale` (Pa).
+    """Normal condition F1 = stress + spring (seat - closure), for n joints.
 
-    Each is one number, or (n,) for n joints.
+    stress: normal stress in Pa, a number or (n,); scale: stress in Pa to which the tolerance
+    refers; spring: stiffness of the surrounding rock in Pa/m (CNS); seat: closure in m at which the
+    spring bears nothing.
     """
 
     stress: float | Array
@@ -29,54 +31,68 @@ def closing_increments(
 ) -> Array:
     """Closure increments (n,) in m that meet the condition in a step with the shear of `step`.
 
-    step: (n, dim) in m; its closures are a first guess. The batch is left as it was. Raises
-    ArithmeticError where no closure meets the condition, and NonFiniteError where the law gives no
-    finite traction on the way.
+    step: (n, dim) in m; its closures are a first guess; tolerance: of `condition.scale`. The batch
+    does not change. Raises ArithmeticError where no closure meets the condition, and NonFiniteError
+    where a trial closure gives no finite traction.
     """
-    here, trial = batch.delta[:, 0], step.copy()
+    closure = batch.delta[:, 0]
+    trial = step.copy()
     u = trial[:, 0]
-    size = np.maximum(np.abs(here), np.abs(step[:, 1:]).max(axis=1, initial=0.0))
+    size = np.maximum(np.abs(closure), np.abs(step[:, 1:]).max(axis=1, initial=0.0))
     if not size.all():
         size = np.where(size > 0, size, batch.law.closure(condition.scale))
-    reach, low, high = size, np.full_like(u, -np.inf), np.full_like(u, np.inf)
-    for _ in range(_TRIES):
+    stride = size
+    low = np.full_like(u, -np.inf)
+    high = np.full_like(u, np.inf)
+    for _ in range(_MAX_ITERATIONS):
         F, C = batch.trial(trial)
         assert C is not None
-        miss = F[:, 0] - condition.stress - condition.spring * (condition.seat - (here + u))
-        # an open joint meets a stress of zero anywhere: look for the point of contact
-        met = (np.abs(miss) <= tolerance * np.asarray(condition.scale)) & (
-            (F[:, 0] != 0) | (miss != 0)
+        spring_stress = condition.spring * (condition.seat - (closure + u))
+        residual = F[:, 0] - condition.stress - spring_stress
+        # an open joint meets a stress of zero anywhere: then find the closure of first contact
+        is_met = (np.abs(residual) <= tolerance * np.asarray(condition.scale)) & (
+            (F[:, 0] != 0) | (residual != 0)
         )
-        low, high = np.where(miss <= 0, u, low), np.where(miss <= 0, high, u)
-        finest = _ROUNDING * np.maximum(np.abs(here + u), size)
-        closed = high - low <= finest
-        guess = _next_guess(u, miss, condition.spring + C[:, 0, 0], (low, high), reach, finest)
-        u[:] = np.where(met, u, np.where(closed, high, guess))
-        if (met | closed).all():
+        low = np.where(residual <= 0, u, low)
+        high = np.where(residual <= 0, high, u)
+        resolution = _RELATIVE_RESOLUTION * np.maximum(np.abs(closure + u), size)
+        is_narrow = high - low <= resolution
+        slope = condition.spring + C[:, 0, 0]
+        guess = _next_guess(u, residual, slope, (low, high), stride, resolution)
+        u[:] = np.where(is_met, u, np.where(is_narrow, high, guess))
+        if (is_met | is_narrow).all():
             return u
-        reach = np.where(np.isinf(high - low), 2.0 * reach, reach)
-    joint = int(np.argmin(met | closed))
+        stride = np.where(np.isinf(high - low), 2.0 * stride, stride)
+    joint = int(np.argmin(is_met | is_narrow))
     stress = np.broadcast_to(condition.stress, u.shape)[joint]
     raise ArithmeticError(
-        f"joint {joint}: no closure between {here[joint] + low[joint]:g} and "
-        f"{here[joint] + high[joint]:g} m gives a normal stress of {stress:g} Pa (spring "
+        f"joint {joint}: no closure between {closure[joint] + low[joint]:g} and "
+        f"{closure[joint] + high[joint]:g} m gives a normal stress of {stress:g} Pa (spring "
         f"{condition.spring:g} Pa/m)"
     )
 
 
 def _next_guess(
-    u: Array, miss: Array, slope: Array, bracket: tuple[Array, Array], reach: Array, finest: Array
+    u: Array,
+    residual: Array,
+    slope: Array,
+    bracket: tuple[Array, Array],
+    stride: Array,
+    resolution: Array,
 ) -> Array:
-    """Newton's guess (n,) where it stays in the bracket, else its middle, or `reach` farther."""
+    """Newton's guess (n,) if it is inside the bracket, else the middle of the bracket.
+
+    A bracket without one of its ends is extended by `stride` at most.
+    """
     low, high = bracket
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        newton = np.where(slope > 0, u - miss / slope, np.nan)
+        newton = np.where(slope > 0, u - residual / slope, np.nan)
         middle = 0.5 * (low + high)
         inside = np.where((low < newton) & (newton < high), newton, middle)
-        bound = np.where(np.isinf(high), u + reach, u - reach)
-        near = np.abs(newton - u) < np.abs(bound - u)  # not where newton is NaN
-        outside = np.where(near, newton, bound)
-        # there but for rounding: step across, to bracket it
-        across = u + np.copysign(finest, bound - u)
-        outside = np.where(np.abs(outside - u) < finest, across, outside)
+        bound = np.where(np.isinf(high), u + stride, u - stride)
+        is_closer = np.abs(newton - u) < np.abs(bound - u)  # False where newton is NaN
+        outside = np.where(is_closer, newton, bound)
+        # at the root but for rounding: step across it, to complete the bracket
+        across = u + np.copysign(resolution, bound - u)
+        outside = np.where(np.abs(outside - u) < resolution, across, outside)
     return np.where(np.isinf(high - low), outside, inside)

@@ -1,4 +1,4 @@
-"""Joints for contacts that come and go: every contact keeps its joint as long as it lasts."""
+"""A pool of joints for contacts that form and end: a contact keeps its joint while it lasts."""
 
 from collections.abc import Hashable, Iterable
 from typing import Any
@@ -14,23 +14,23 @@ Places = NDArray[np.intp]
 
 
 class JointPool:
-    """Joints of one law, found by the key of their contact.
+    """Joints of one law, identified by the keys of their contacts.
 
-    A key is whatever names a contact as long as it lasts, such as the pair of its body numbers.
-    The joints live in `batch`; `assign` or `add` tell their places there, for
-    `batch.update(d, where=places)`. A place that falls free goes to a later contact, whose joint
-    starts anew. law, ledger: as of `JointBatch`.
+    A key is any hashable object that names a contact while it lasts, such as the pair of its body
+    numbers. `batch` holds the joints; `assign` and `add` return their places in it, for
+    `batch.update(d, where=places)`. A released place is used for a later contact, whose joint
+    starts in the virgin state. law, track_dissipation: as in `JointBatch`.
 
-    A host that keeps the places of its contacts itself needs no keys: `allocate` and `release`
-    follow contacts that begin and end.
+    A host that stores the places of its contacts itself needs no keys, only `allocate` and
+    `release`.
 
     >>> pool = jl.JointPool(law)
     >>> places = pool.assign([(1, 2), (1, 3)])
     >>> F, _ = pool.batch.update(np.full((2, 3), 1e-8), where=places)
     """
 
-    def __init__(self, law: Any, ledger: bool = True) -> None:
-        self.batch = JointBatch(law, 0, ledger)
+    def __init__(self, law: Any, track_dissipation: bool = True) -> None:
+        self.batch = JointBatch(law, 0, track_dissipation)
         self._place: dict[Hashable, int] = {}
         self._free: list[int] = []  # descending, so that pop() takes the lowest place
 
@@ -39,7 +39,7 @@ class JointPool:
 
     @property
     def keys(self) -> list[Hashable]:
-        """Keys of all contacts, in the order in which they came."""
+        """Keys of all contacts, in the order in which they were added."""
         return list(self._place)
 
     @property
@@ -48,35 +48,35 @@ class JointPool:
         return np.fromiter(self._place.values(), np.intp, len(self._place))
 
     def assign(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
-        """Hold just these contacts: the others are dropped, new ones added; their places (n,).
+        """Make the contacts of the pool equal to `keys`: drop all others and add new ones.
 
-        keys, mated: as of `add`, which raises the same.
+        keys, mated, returns and raises: as `add`.
         """
-        wanted = list(keys)
-        _ = mated or self.batch.law.unmated_start  # refused before anything changes
-        self.drop(self._place.keys() - set(wanted))
-        return self.add(wanted, mated)
+        contacts = list(keys)
+        self._require_start(mated)
+        self.drop(self._place.keys() - set(contacts))
+        return self.add(contacts, mated)
 
     def add(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
-        """Places (n,) of the joints of these contacts; those not held yet get new joints.
+        """Places (n,) of the joints of these contacts; contacts without a joint get a new one.
 
-        keys: of n contacts. mated: whether the faces of the new ones fit each other, or have never
-        met (`JointLaw.joint`). Raises ValueError where a law is always mated.
+        keys: of n contacts. mated: whether the faces of new contacts interlock, or have never met
+        (`JointLaw.joint`). Raises ValueError for mated=False and a law that is always mated.
         """
-        wanted = list(keys)
-        _ = mated or self.batch.law.unmated_start
-        new = [key for key in dict.fromkeys(wanted) if key not in self._place]
+        contacts = list(keys)
+        self._require_start(mated)
+        new = [key for key in dict.fromkeys(contacts) if key not in self._place]
         self._place.update(zip(new, self.allocate(len(new), mated).tolist(), strict=True))
-        return np.array([self._place[key] for key in wanted], np.intp)
+        return np.array([self._place[key] for key in contacts], np.intp)
 
     def allocate(self, n: int, mated: bool = True) -> Places:
         """Places (n,) of n new joints without keys, the lowest free ones.
 
-        mated: as of `add`. Raises ValueError where n is no whole number >= 0, or a law is always
-        mated.
+        mated: as in `add`. Raises ValueError where n is no whole number >= 0, or for mated=False
+        and a law that is always mated.
         """
         n = integer("n", n, 0)
-        _ = mated or self.batch.law.unmated_start
+        self._require_start(mated)
         missing = n - len(self._free)
         if missing > 0:
             first = len(self.batch)
@@ -88,10 +88,10 @@ class JointPool:
         return places
 
     def release(self, places: Places) -> None:
-        """Give back places (m,) of `allocate`; their joints are reset.
+        """Release places (m,) of `allocate`; their joints are reset.
 
-        Raises ValueError for another place, free or of a contact with a key, and for a place that
-        `places` names twice.
+        Raises ValueError for a place that is free, belongs to a contact with a key, or occurs twice
+        in `places`.
         """
         released = np.asarray(places, np.intp).tolist()
         allocated = {*range(len(self.batch))}.difference(self._free, self._place.values())
@@ -108,20 +108,25 @@ class JointPool:
         self.batch.reset(np.array(places, np.intp))
         self._free = sorted([*self._free, *places], reverse=True)
 
+    def _require_start(self, mated: bool) -> None:
+        """Raise ValueError for mated=False and a law that is always mated."""
+        if not mated:
+            _ = self.batch.law.unmated_start
+
     def drop(self, keys: Iterable[Hashable]) -> None:
-        """Forget the contacts of these `keys`. Raises KeyError for a key that is not held."""
-        gone = list(dict.fromkeys(keys))
-        places = [self._place[key] for key in gone]
+        """Remove the contacts of these `keys`. Raises KeyError for a key without a contact."""
+        removed = list(dict.fromkeys(keys))
+        places = [self._place[key] for key in removed]
         self._release(places)
-        for key in gone:
+        for key in removed:
             del self._place[key]
 
     def snapshot(self) -> JointState:
-        """A copy of the state of all contacts, in the order of `keys`: keep those beside it."""
+        """A copy of the states of all contacts in the order of `keys`, without the keys."""
         return self.batch.snapshot(self.places)
 
     def restore(self, keys: Iterable[Hashable], state: JointState) -> None:
-        """Hold just these contacts, with the states of a snapshot, in a new `batch`.
+        """Replace all contacts by `keys` with the states of a snapshot, in a new `batch`.
 
         Raises ValueError if another law wrote the state or the numbers of keys and states differ.
         """
@@ -131,6 +136,8 @@ class JointPool:
                 f"keys name {len(place)} contacts, state holds {len(state)} joints: give the keys "
                 "that the pool had when the snapshot was taken"
             )
-        batch = JointBatch(self.batch.law, len(place), self.batch.ledger)
+        batch = JointBatch(self.batch.law, len(place), self.batch.track_dissipation)
         batch.restore(state)
-        self.batch, self._place, self._free = batch, place, []
+        self.batch = batch
+        self._place = place
+        self._free = []

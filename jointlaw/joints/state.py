@@ -17,8 +17,8 @@ _VERSION = 1  # of the file, which holds the values with joints last
 class JointState:
     """State of one joint or a batch, as `snapshot()` returns it.
 
-    fingerprint: of the law that wrote it. values: (n, state_size), a row a joint, in the order of
-    `jointlaw.kernels.reference`; `law.step` takes them.
+    fingerprint: of the law that wrote it. values: (n, state_size), one row per joint, in the order
+    of `jointlaw.kernels.reference`, as `law.step` accepts them.
     """
 
     fingerprint: str
@@ -31,16 +31,18 @@ class JointState:
         """Raise ValueError if the law of this fingerprint did not write the state."""
         if self.fingerprint == fingerprint:
             return
-        mine, here = (text.partition(":")[0] for text in (self.fingerprint, fingerprint))
-        if mine != here:
+        own_version = self.fingerprint.partition(":")[0]
+        version = fingerprint.partition(":")[0]
+        if own_version != version:
             raise ValueError(
-                f"state is of discretisation {mine}, this jointlaw has {here}: facets and cells "
-                "are not the same; run the path again, or install the version that wrote the state"
+                f"state is of discretisation {own_version}, this jointlaw has {version}: facets "
+                "and cells are not the same; run the path again, or install the version that wrote "
+                "the state"
             )
         raise ValueError("state belongs to a joint law with other parameters")
 
     def save(self, path: str | Path) -> None:
-        """Write the state to an NPZ file, whole or not at all."""
+        """Write the state to an NPZ file, atomically."""
         buffer = io.BytesIO()
         np.savez(buffer, version=_VERSION, fingerprint=self.fingerprint, values=self.values.T)
         replace_file(Path(path), buffer.getvalue())
@@ -49,8 +51,8 @@ class JointState:
 class NonFiniteError(FloatingPointError, ValueError):
     """A step gave a traction or state that is not finite; nothing was moved.
 
-    `joint` is its number in the batch, `state` its state before the step, `d` its increment (dim,)
-    in m: after `joint.restore(error.state)`, `joint.update(error.d)` fails again.
+    `joint` is the index of the joint in the batch, `state` its state before the step, `d` its
+    increment (dim,) in m: after `joint.restore(error.state)`, `joint.update(error.d)` fails again.
     """
 
     joint: int
@@ -59,7 +61,7 @@ class NonFiniteError(FloatingPointError, ValueError):
 
 
 def load_state(path: str | Path) -> JointState:
-    """Read a state that `JointState.save` wrote to `path`. Raises ValueError if it is none.
+    """Read a state that `JointState.save` wrote. Raises ValueError for any other file.
 
     >>> joint.snapshot().save("joint.npz")
     >>> joint.restore(jl.load_state("joint.npz"))
@@ -73,7 +75,8 @@ def load_state(path: str | Path) -> JointState:
             version = int(data["version"])
             if version != _VERSION:
                 raise ValueError(f"its version is {version}, this jointlaw reads {_VERSION}")
-            fingerprint, values = str(data["fingerprint"]), data["values"]
+            fingerprint = str(data["fingerprint"])
+            values = data["values"]
         if values.ndim != 2 or values.dtype.kind != "f":
             raise ValueError("values is no table of numbers")
     except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:

@@ -1,10 +1,26 @@
-"""The asperities of a joint, an element: the readable text of their step.
+"""The asperities of a joint, an element: the readable version of their step.
 
-Symbols and order are those of docs/theory-incremental.md. Arrays carry physical axes first and
-joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). Rows of their state are q (2 M
-D), the shear force of a slider times lam, in the basis (s, t) of its facet: that of Eq. 25 where
-the joint is mated. With asperities that yield follow flattened depth (M) | plastic work (1); with
-wear, the share of the slopes that is gone (1) | work that wears them (1).
+Symbols and order are as in docs/theory-incremental.md. Arrays carry physical axes first and joints
+last: facets (M, B), cells (M, D, B), sliders (2, M, D, B).
+
+The orientations of asperity contacts are represented by M facets, each a bed of springs that
+engage at different effective closures. A facet is divided into D cells. A cell has the normal
+force of its springs, A G n, which depends on the effective closure alone, and one slider with
+Coulomb friction, which carries the shear force of its springs. Only the sliders are history
+variables: q (2 M D rows) is the shear force of a slider times lam, in the basis (s, t) of its
+facet, which is the basis of Eq. 25 at the interlocked position.
+
+A step evaluates the cells before and after the increment, loads the sliders by the increment of
+shear in the facet (the trial state), returns trial forces beyond the Coulomb limit to it (return
+mapping), and sums tractions over all facets. The stiffness of a cell changes with closure. Where it
+increases, springs without force have engaged, so that a slider is loaded along the chord stiffness
+of the step; where it decreases, springs disengage and release their part of the slider force. This
+asymmetry makes every term of the dissipated energy non-negative, whatever the step.
+
+Options add rows to the state. If asperities yield: the plastic indentation (M) of every facet and
+the plastic work (1), see plasticity.py. If asperities degrade: the lost fraction of the slopes (1)
+and the shear work (1) that degrades them, see degradation.py. If the interlock decays, planes of
+facets rotate with slip, see interlock.py.
 """
 
 from functools import cached_property
@@ -13,8 +29,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretisation.first_loading import FirstLoading
-from ..discretisation.tables import FacetTables, largest_reach
+from ..discretisation.first_loading_response import FirstLoadingResponse
+from ..discretisation.tables import FacetTables, max_effective_closure
 from ..support.checks import Array
 from ..support.thresholds import (
     FRICTION_TOLERANCE,
@@ -23,95 +39,106 @@ from ..support.thresholds import (
     ROUNDING_TOLERANCE,
     UNDERFLOW,
 )
-from .cells import Cells, cells, compliance, reciprocal
+from .cells import Cells, evaluate_cells, reciprocal, slider_compliance
+from .degradation import degrade_sliders, degrade_slopes
 from .element import Element, ElementResponse, Measures
-from .mating import Planes, Turning, first_touch, offset, planes, turning
-from .stiffness import bend_of, joining, rises, stiffness_of
-from .wear import lowered, worn_share
-from .yielding import flatten, flattened, plastic_work, softening
+from .interlock import PlaneDerivatives, Planes, first_touch, offset, plane_derivatives, planes
+from .plasticity import plastic_softening, plastic_work, subtract_plastic, update_indentation
+from .stiffness import (
+    curvature_stiffness,
+    engagement_stiffness,
+    largest_climb,
+    stiffness_bound,
+)
 
 Flags = NDArray[np.bool_]
-FARTHEST = 1e150  # mating lengths of slip: beyond it squares of the distance overflow
+MAX_SLIP = 1e150  # mating lengths: squares of larger slips overflow
 
 
-class State(NamedTuple):
-    """The parts of the asperities' rows (rows, B) of a state, as views."""
+class AsperityState(NamedTuple):
+    """The parts of the rows (rows, B) of asperities in a state, as views."""
 
-    q: Array
-    depth: Array  # flattened depth of every facet (M, B), no rows where asperities do not yield
-    plastic: Array  # (B,) or no rows
-    worn: Array  # share of the slopes that is gone (B,), or no rows
-    work: Array  # of shear, which wears them (B,), or no rows
+    q: Array  # slider forces times lam (2, M, D, B)
+    indentation: Array  # plastic indentation of every facet (M, B); no rows unless they yield
+    plastic_work: Array  # (B,) in J/m2, or no rows
+    lost_slopes: Array  # lost fraction of the slopes (B,); no rows unless they degrade
+    shear_work: Array  # (B,) in J/m2 that degrades slopes, or no rows
 
     @property
-    def slopes(self) -> Array:
-        """Share of the slopes that is left (B,)."""
-        return 1 - self.worn if self.worn.size else np.ones(self.q.shape[-1])
+    def slope_retention(self) -> Array:
+        """Remaining fraction of the slopes (B,)."""
+        return 1 - self.lost_slopes if self.lost_slopes.size else np.ones(self.q.shape[-1])
 
 
 class Sliders(NamedTuple):
-    """The sliders of a step: trial forces (2, M, D, B), the rest (M, D, B)."""
+    """The sliders of a step: trial forces (2, M, D, B), all else (M, D, B)."""
 
-    trial: Array  # q before the friction limit
+    trial: Array  # q of the trial state
     size: Array  # |trial|
     strength: Array  # mu lam A gamma: the friction limit of q over G
-    cap: Array  # strength G: the friction limit of q
-    share: Array  # cap over size where the slider slips, 1 elsewhere
-    chord: Array  # of G over the step: stiffness of springs that were added on the way
-    grows: Flags  # whether the stiffness of the cell has grown
-    near: Flags  # whether y has hardly changed
+    limit: Array  # strength G: the friction limit of q
+    scale: Array  # limit over size if the slider slips, 1 else: return mapping
+    chord: Array  # stiffness of G over the step, for springs that engaged on the way
+    stiffens: Flags  # whether the stiffness of the cell has increased
+    is_small: Flags  # whether y has hardly changed
     slips: Flags  # whether the slider is at its friction limit, but for rounding
 
     @property
-    def unit(self) -> Array:
+    def direction(self) -> Array:
         """Direction of the trial force (2, M, D, B)."""
         size = self.size
         return np.divide(self.trial, size, out=np.zeros_like(self.trial), where=size > 0)
 
     @property
     def push(self) -> Array:
-        """Derivative (2, M, D, B) of q by G: strength along a slider that slips, 0 elsewhere."""
-        return np.where(self.slips, self.strength * self.unit, 0.0)
+        """Derivative (2, M, D, B) of q by G: strength in a slider that slips, 0 in others."""
+        return np.where(self.slips, self.strength * self.direction, 0.0)
 
 
-class Asperities(Element):
-    """Asperities that stick, slip and part; with mating, yielding and wear where the law has it."""
+class AsperityElement(Element):
+    """Asperities that stick, slip and separate, with the options of the law."""
 
     native_name = "asperities"
 
     def __init__(self, k: FacetTables) -> None:
-        self.k, M = k, len(k.c1)
+        self.k = k
+        M = len(k.c1)
         self.rows = {"q": 2 * M * k.cells}
-        self.rows |= {"depth": M, "plastic": 1} if k.yields else {}
-        self.rows |= {"worn": 1, "work": 1} if k.wears else {}
-        self.stretch = 1.0 + 2.0 * float(np.max(np.abs(k.m)))
-        reach = largest_reach(k.curve, k.area, k.theta, k.asperity)
-        self.reach = min(reach, FARTHEST * k.mating_length)
-        self.farthest = self.first_loading.farthest
+        if k.yields:
+            self.rows |= {"indentation": M, "plastic_work": 1}
+        if k.degrades:
+            self.rows |= {"lost_slopes": 1, "shear_work": 1}
+        self.closure_per_displacement = 1.0 + 2.0 * float(np.max(np.abs(k.m)))
+        finite = max_effective_closure(k.curve, k.area, k.theta, k.asperity)
+        self.max_effective_closure = min(finite, MAX_SLIP * k.mating_length)
+        self.max_search_closure = self.first_loading.max_search_closure
 
     def numbers(self) -> dict[str, float]:
-        k, (more, most) = self.k, joining(self.k)
+        k = self.k
+        engagement_factor, engagement_limit = engagement_stiffness(k)
+        can_be_unmated = k.interlock_decays and k.dim > 1
+        curvature = float(np.sum(curvature_stiffness(k))) if k.interlock_decays else 0.0
         return {
             "facets": len(k.c1),
             "cells": k.cells,
             "pieces": len(k.curve.S),
             "yields": int(k.yields),
-            "interlock_decays": int(k.fades),
-            "degrades": int(k.wears),
+            "interlock_decays": int(k.interlock_decays),
+            "degrades": int(k.degrades),
             "stiffness_ratio": 1.0 / k.lam,
             "mu": k.mu,
             "mating_length": k.mating_length,
             "slope_wear": k.slope_wear,
             "slope_residual": k.slope_residual,
-            "first_touch_closure": float(first_touch(k)[0]) if k.fades and k.dim > 1 else 0.0,
+            "first_touch_closure": float(first_touch(k)[0]) if can_be_unmated else 0.0,
             "eta": k.curve.eta,
             "curve_scale": k.curve.scale,
-            "curve_exponent": float(k.curve.rise),
+            "curve_exponent": float(k.curve.exponent),
             "normal_stress_factor": self.first_loading.factor,
             "stiffness_factor": float(np.sum(k.area / k.c1)),
-            "curvature_stiffness_factor": float(np.sum(bend_of(k))) if k.fades else 0.0,
-            "engagement_stiffness_factor": more,
-            "engagement_stiffness_limit": most,
+            "curvature_stiffness_factor": curvature,
+            "engagement_stiffness_factor": engagement_factor,
+            "engagement_stiffness_limit": engagement_limit,
         }
 
     def step(
@@ -119,117 +146,138 @@ class Asperities(Element):
     ) -> ElementResponse:
         """As `Element.step`.
 
-        1. Where slopes wear they have, by the work of shear so far ("Wear"). The joint moves by d.
-           Every facet then has y = n . (closure, offset)/c1, before and after; the offset is the
-           displacement in the plane, less than the mating length ("Mating").
-        2. Virgin curve at y: Phi, Phi', and the share G, kappa = dG/dy of every depth cell ("Few
-           cells, exact virgin curve").
-        3. Sliders are loaded by the increment de of the facet's plane at mid-step. Where kappa
-           grew, q += A/c1 chord de; where it fell, the springs that part take their force along,
-           q = q kappa1/kappa0 + A/c1 kappa1 de.
-        4. Coulomb friction: |q| <= mu lam A gamma G (Eq. 5, 6).
-           Where asperities yield, Phi, G and kappa are less their values at the flattened depth
-           ("Yielding").
+        1. If asperities degrade, slopes decrease by the shear work so far ("Asperity degradation").
+           The joint moves by d. Every facet then has y = n . (closure, offset)/c1, before and
+           after; the offset is the in-plane displacement, limited by the mating length ("Loss of
+           interlock with slip").
+        2. First-loading curve at y: Phi, Phi', and G, kappa = dG/dy of every cell ("Discretisation
+           into cells").
+        3. Sliders are loaded by the increment de in the plane of the facet at mid-step. Where kappa
+           has increased, q += A/c1 chord de; where it has decreased, springs that disengage release
+           their force, q = q kappa1/kappa0 + A/c1 kappa1 de.
+        4. Return mapping to the Coulomb limit: |q| <= mu lam A gamma G (Eq. 5, 6).
+           If asperities yield, Phi, G and kappa are less their values at the plastic indentation
+           ("Yielding of asperities").
         5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21), by the planes at the end.
-        6. Dissipated energy, every term >= 0 ("No step creates energy"). What of friction is work
-           of the joint's own shear wears slopes from the next step on.
-        7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
+        6. Dissipated energy, every term >= 0 ("Energy balance"). The part of friction that is work
+           of the joint's own shear degrades slopes from the next step on.
+        7. Tangent C = dF/dd ("The consistent tangent"), only with `tangent`.
         """
-        k, old, new_ = self.k, parts(self.k, state), parts(self.k, new)
-        q, lost, slopes = old.q, np.zeros(d.shape[1]), old.slopes
-        if k.wears:
-            new_.worn[:] = worn_share(k, old.worn, old.work)
-            slopes = new_.slopes
-            q, lost = wear(k, delta, old, slopes)
-        moved = delta + d
-        middle = planes(k, delta[1:] + 0.5 * d[1:], slopes)
-        end = planes(k, moved[1:], slopes)
+        k = self.k
+        old = self.unpack(state)
+        updated = self.unpack(new)
+        q = old.q
+        retention = old.slope_retention
+        dissipated = np.zeros(d.shape[1])
+        if k.degrades:
+            updated.lost_slopes[:] = degrade_slopes(k, old.lost_slopes, old.shear_work)
+            retention = updated.slope_retention
+            q, dissipated = degrade(k, delta, old, retention)
+        after_delta = delta + d
+        middle_p = delta[1:] + 0.5 * d[1:]
+        middle = planes(k, middle_p, retention)
+        end = planes(k, after_delta[1:], retention)
 
-        before = cells(k, effective_closure(k, delta, slopes))
-        after = cells(k, effective_closure(k, moved, slopes))
-        gained, flat0, flat1 = after.G - before.G, None, None
+        before = evaluate_cells(k, effective_closure(k, delta, retention))
+        after = evaluate_cells(k, effective_closure(k, after_delta, retention))
+        increase = after.G - before.G
+        indented0 = None
+        indented1 = None
         if k.yields:
-            new_.depth[:] = flatten(k, old.depth, after.y)
-            flat0, flat1 = cells(k, old.depth), cells(k, new_.depth)
-            crushed = plastic_work(k, before.y, after.y, flat0, flat1)
-            new_.plastic[:] = old.plastic + crushed
-            gained = after.G - np.maximum(before.G, flat0.G)
-            before, after = flattened(before, flat0), flattened(after, flat1)
+            updated.indentation[:] = update_indentation(k, old.indentation, after.y)
+            indented0 = evaluate_cells(k, old.indentation)
+            indented1 = evaluate_cells(k, updated.indentation)
+            work = plastic_work(k, before.y, after.y, indented0, indented1)
+            updated.plastic_work[:] = old.plastic_work + work
+            increase = after.G - np.maximum(before.G, indented0.G)
+            before = subtract_plastic(before, indented0)
+            after = subtract_plastic(after, indented1)
 
         de = np.einsum("edmb,db->emb", middle.basis, d)[:, :, None]  # in the facet (2, M, 1, B)
-        sliders = load(k, before, gained, after, strength(k, end.gamma), q, de)
-        resolved = (
-            sliders.size**2 > MIN_DIVISOR
-        )  # squares of smaller forces underflow: they count as zero
-        new_.q[:] = np.where(resolved, sliders.share, 0.0) * sliders.trial
-        F = resultant(k, end, after.force, new_.q)
+        sliders = load_sliders(k, before, increase, after, friction_limit(k, end.gamma), q, de)
+        # squares of smaller forces underflow: such forces count as zero
+        is_resolved = sliders.size**2 > MIN_DIVISOR
+        updated.q[:] = np.where(is_resolved, sliders.scale, 0.0) * sliders.trial
+        F = sum_traction(k, end, after.force, updated.q)
 
-        rubbed = friction_loss(k, before, after, q, sliders)
-        lost = lost + rubbed
-        if k.wears:
-            F0 = resultant(k, planes(k, delta[1:], slopes), before.force, q)
-            new_.work[:] = old.work + np.minimum(rubbed, shear_work(F0, F, d))
+        friction = friction_dissipation(k, before, after, q, sliders)
+        dissipated = dissipated + friction
+        if k.degrades:
+            F0 = sum_traction(k, planes(k, delta[1:], retention), before.force, q)
+            updated.shear_work[:] = old.shear_work + np.minimum(friction, shear_work(F0, F, d))
         if k.yields:
-            lost = lost + crushed
+            dissipated = dissipated + work
         if not tangent:
-            return ElementResponse(F, lost, None)
+            return ElementResponse(F, dissipated, None)
         E = middle.basis
-        if k.fades:  # the middle moves by half of what d changes by
-            turned = turning(k, delta[1:] + 0.5 * d[1:], slopes).basis
+        if k.interlock_decays:  # the middle moves by half of the change of d
+            derivative = plane_derivatives(k, middle_p, retention).basis
             E = np.broadcast_to(E, (*E.shape[:3], d.shape[1])).copy()
-            E[:, 1:] += 0.5 * np.einsum("edjmb,db->ejmb", turned, d)
-        C = stiffness(k, before, after, sliders, de, E, end)
-        if flat0 is not None and flat1 is not None:
-            C = C - softening(k, after, flat0, flat1, sliders.push, end)
-        if k.fades:
-            C[:, 1:] += bending(k, after, sliders, new_.q, end, turning(k, moved[1:], slopes))
-        return ElementResponse(F, lost, C)
+            E[:, 1:] += 0.5 * np.einsum("edjmb,db->ejmb", derivative, d)
+        C = tangent_of_fixed_planes(k, before, after, sliders, de, E, end)
+        if indented0 is not None and indented1 is not None:
+            C = C - plastic_softening(k, after, indented0, indented1, sliders.push, end)
+        if k.interlock_decays:
+            rotation = plane_derivatives(k, after_delta[1:], retention)
+            C[:, 1:] += tangent_of_rotation(k, after, sliders, updated.q, end, rotation)
+        return ElementResponse(F, dissipated, C)
 
     def traction(self, delta: Array, state: Array) -> Array:
-        """As `Element.traction`: slopes that are to wear in the next step have not yet."""
-        held = state.copy()
-        parts(self.k, held).work[:] = 0.0
-        return super().traction(delta, held)
+        """As `Element.traction`, before the degradation that the next step would begin with."""
+        undegraded = state.copy()
+        self.unpack(undegraded).shear_work[:] = 0.0
+        return super().traction(delta, undegraded)
 
     def measures(self, delta: Array, state: Array) -> Measures:
-        k, now = self.k, parts(self.k, state)
-        virgin = cells(k, effective_closure(k, delta, now.slopes))
-        held = flattened(virgin, cells(k, now.depth) if k.yields else None)
-        limit = strength(k, planes(k, delta[1:], now.slopes).gamma)
+        k = self.k
+        now = self.unpack(state)
+        elastic = evaluate_cells(k, effective_closure(k, delta, now.slope_retention))
+        indented = evaluate_cells(k, now.indentation) if k.yields else None
+        cells = subtract_plastic(elastic, indented)
+        limit = friction_limit(k, planes(k, delta[1:], now.slope_retention).gamma)
         q2 = now.q[0] ** 2 + now.q[1] ** 2
-        capped = at_limit(np.sqrt(q2), limit, held.G, virgin.force)
+        slips = is_at_limit(np.sqrt(q2), limit, cells.G, elastic.force)
         weight = (k.weight / k.weight.sum())[:, None]
-        touches = held.y > (now.depth if k.yields else 0.0)
-        sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)
-        total = np.where(held.force > 0, held.force, 1.0)
-        slipping = np.sum(np.where(capped, held.G, 0.0), axis=1) / total
-        normal = k.curve.energy(held.y)
+        touches = cells.y > (now.indentation if k.yields else 0.0)
+        sliding = np.sum(weight * (touches & np.all(slips, axis=1)), axis=0)
+        total = np.where(cells.force > 0, cells.force, 1.0)
+        slipping = np.sum(np.where(slips, cells.G, 0.0), axis=1) / total
+        normal = k.curve.energy(cells.y)
         if k.yields:
-            normal = normal - k.curve.energy(now.depth)
-            normal = normal - k.curve.force(now.depth)[0] * (held.y - now.depth)
+            normal = normal - k.curve.energy(now.indentation)
+            normal = normal - k.curve.force(now.indentation)[0] * (cells.y - now.indentation)
             normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
-        stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
+        normal_energy = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
+        shear_energy = np.sum(slider_compliance(k) * q2 * reciprocal(cells.kappa), axis=(0, 1))
         return Measures(
             sliding,
             np.sum(weight * slipping, axis=0),
             np.sum(weight * ~touches, axis=0),
-            stored + np.sum(compliance(k) * q2 * reciprocal(held.kappa), axis=(0, 1)),
-            np.max(held.y, axis=0),
+            normal_energy + shear_energy,
+            np.max(cells.y, axis=0),
         )
 
     def normal_stress(self, closure: Array) -> Array:
-        """As `Element.normal_stress`, of infinitely many depth cells: a joint's own slip later."""
+        """As `Element.normal_stress`, in the limit of many cells: a joint's own cells slip later.
+
+        Few cells differ only if asperities yield.
+        """
         return self.first_loading.stress(closure)
 
     def stiffness(self, delta: Array, state: Array) -> Array:
-        """As `Element.stiffness`; yielded asperities are less stiff."""
-        return stiffness_of(self.k, effective_closure(self.k, delta, parts(self.k, state).slopes))
+        """As `Element.stiffness`, without plastic indentation, which lowers it."""
+        retention = self.unpack(state).slope_retention
+        return stiffness_bound(self.k, effective_closure(self.k, delta, retention))
 
     def largest_stiffness(self, closure: Array, shear: Array) -> Array:
-        # shear closes one of two opposite facets, which are alike, and opens the other
-        closed = (closure[..., None] + 0.0 * self.k.c1, closure[..., None] + rises(self.k, shear))
-        level, risen = (stiffness_of(self.k, np.moveaxis(y, -1, 0)) for y in closed)
-        return 0.5 * (level + risen)
+        """As `Element.largest_stiffness`.
+
+        Shear closes one of two opposite facets, which have the same weight, and opens the other.
+        """
+        level = closure[..., None] + 0.0 * self.k.c1
+        climbed = closure[..., None] + largest_climb(self.k, shear)
+        bounds = [stiffness_bound(self.k, np.moveaxis(y, -1, 0)) for y in (level, climbed)]
+        return 0.5 * (bounds[0] + bounds[1])
 
     def shear_stiffness(self, delta: Array, stress: float) -> float:
         """As `Element.shear_stiffness`: the secant normal stiffness over lam."""
@@ -243,147 +291,180 @@ class Asperities(Element):
         Friction adds at most mu times the square of the length of the normal.
         """
         bound = self.largest_stiffness(closure, np.zeros(()))
-        F, lam, mu, theta = reduction, self.k.lam, self.k.mu, self.k.theta
+        F = reduction
         if F == 1.0:
             return bound
-        normal = np.cos(theta) ** 2 + np.sin(theta) ** 2 / F**2  # squares of the lengths
-        tangent = np.sin(theta) ** 2 + np.cos(theta) ** 2 / F**2
-        mixed = (np.cos(theta) * np.sin(theta) * (1 / F**2 - 1)) ** 2  # square of their product
-        spread = np.sqrt((normal - tangent / lam) ** 2 + 4 * mixed / lam)
-        elastic = 0.5 * (normal + tangent / lam + spread)
-        largest = float((elastic + mu * normal).max())
+        lam = self.k.lam
+        mu = self.k.mu
+        cos2 = np.cos(self.k.theta) ** 2
+        sin2 = np.sin(self.k.theta) ** 2
+        normal2 = cos2 + sin2 / F**2  # squares of the lengths
+        tangent2 = sin2 + cos2 / F**2
+        mixed2 = cos2 * sin2 * (1 / F**2 - 1) ** 2  # square of their product
+        spread = np.sqrt((normal2 - tangent2 / lam) ** 2 + 4 * mixed2 / lam)
+        elastic = 0.5 * (normal2 + tangent2 / lam + spread)
+        largest = float((elastic + mu * normal2).max())
         return bound * (largest / (max(1.0, 1 / lam) + mu))
 
     @cached_property
-    def first_loading(self) -> FirstLoading:
+    def first_loading(self) -> FirstLoadingResponse:
         """First closure without shear."""
-        return FirstLoading.of(self.k.curve, self.k.theta, self.k.area, self.k.asperity)
+        k = self.k
+        return FirstLoadingResponse.of(k.curve, k.theta, k.area, k.asperity)
 
-
-def parts(k: FacetTables, state: Array) -> State:
-    """Views of the parts of the asperities' rows, q as (2, M, D, B)."""
-    M = len(k.c1)
-    q, rest = np.split(state, [2 * M * k.cells])
-    depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
-    worn, work = rest[-2:] if k.wears else (rest[:0], rest[:0])
-    return State(q.reshape(2, M, k.cells, -1), depth, plastic, worn, work)
+    def unpack(self, rows: Array) -> AsperityState:
+        """Views of the parts of the rows (rows, B) of asperities, q as (2, M, D, B)."""
+        k = self.k
+        M = len(k.c1)
+        q, options = np.split(rows, [2 * M * k.cells])
+        none = options[:0]
+        indentation, work = (options[:M], options[M]) if k.yields else (none, none)
+        lost_slopes, shear_work = options[-2:] if k.degrades else (none, none)
+        return AsperityState(
+            q.reshape(2, M, k.cells, -1), indentation, work, lost_slopes, shear_work
+        )
 
 
 def shear_work(F0: Array, F: Array, d: Array) -> Array:
-    """Size (B,) of the work in J/m2 of the shear stress, from F0 to F, in the increment d."""
+    """Size (B,) in J/m2 of the work of the shear stress, from F0 to F, in the increment d."""
     return np.abs(0.5 * np.sum((F0[1:] + F[1:]) * d[1:], axis=0))
 
 
-def effective_closure(k: FacetTables, delta: Array, slopes: Array) -> Array:
+def effective_closure(k: FacetTables, delta: Array, slope_retention: Array) -> Array:
     """Effective closure y = n . (closure, offset)/c1 of every facet (M, B)."""
     y = k.m[0][:, None] * delta[0]
     for row, o in zip(k.m[1:], offset(k, delta[1:]), strict=True):
-        y = y + row[:, None] * (slopes * o if k.wears else o)
+        y = y + row[:, None] * (slope_retention * o if k.degrades else o)
     return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
 
 
-def wear(k: FacetTables, delta: Array, old: State, slopes: Array) -> tuple[Array, Array]:
-    """q (2, M, D, B) and lost energy (B,) after slopes have fallen to the share `slopes` (B,)."""
-    flat = cells(k, old.depth) if k.yields else None
-    was, now = (
-        flattened(cells(k, effective_closure(k, delta, share)), flat)
-        for share in (old.slopes, slopes)
+def degrade(
+    k: FacetTables, delta: Array, old: AsperityState, slope_retention: Array
+) -> tuple[Array, Array]:
+    """Slider forces q and dissipated energy (B,) after slopes decrease to this retention (B,)."""
+    indented = evaluate_cells(k, old.indentation) if k.yields else None
+    before, after = (
+        subtract_plastic(evaluate_cells(k, effective_closure(k, delta, retention)), indented)
+        for retention in (old.slope_retention, slope_retention)
     )
-    mean = 0.5 * (k.area * k.c1)[:, None] * (was.force + now.force)
-    normal = np.sum(mean * (was.y - now.y), axis=0)
-    limit = strength(k, planes(k, delta[1:], slopes).gamma)
-    q, lost = lowered(k, was, now, limit, old.q)
-    return q, lost + np.maximum(normal, 0.0)  # >= 0 by the pairs of facets, but for rounding
+    mean = 0.5 * (k.area * k.c1)[:, None] * (before.force + after.force)
+    normal = np.sum(mean * (before.y - after.y), axis=0)
+    limit = friction_limit(k, planes(k, delta[1:], slope_retention).gamma)
+    q, dissipated = degrade_sliders(k, before, after, limit, old.q)
+    # >= 0, but for rounding, because opposite facets have the same weight
+    return q, dissipated + np.maximum(normal, 0.0)
 
 
-def load(
-    k: FacetTables, before: Cells, gained: Array, after: Cells, strength: Array, q: Array, de: Array
+def load_sliders(
+    k: FacetTables,
+    before: Cells,
+    increase: Array,
+    after: Cells,
+    strength: Array,
+    q: Array,
+    de: Array,
 ) -> Sliders:
     """Trial forces of all sliders and their friction limits: steps 3 and 4 of `step`.
 
-    gained: what G of every cell grows by, before springs yield at the new y, which they do at once.
+    increase: of G of every cell (M, D, B), before springs yield at the new y, which they do at
+    once. strength: friction limit of q over G; de: increment of shear (2, M, 1, B).
     """
-    kappa0, kappa1 = before.kappa, after.kappa
+    kappa0 = before.kappa
+    kappa1 = after.kappa
     dy = (after.y - before.y)[:, None]
-    near = np.abs(dy) <= MIN_CHORD_STEP * np.abs(after.y)[:, None]
-    if k.yields:  # all flattened springs touch at one closure: the mean is wrong in that step
-        near = near & ((kappa0 > 0) | (kappa1 == 0))
+    is_small = np.abs(dy) <= MIN_CHORD_STEP * np.abs(after.y)[:, None]
+    if k.yields:  # plastic springs engage at one closure: the mean is wrong in that step
+        is_small = is_small & ((kappa0 > 0) | (kappa1 == 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        chord = np.where(near, 0.5 * (kappa0 + kappa1), gained / dy)
+        chord = np.where(is_small, 0.5 * (kappa0 + kappa1), increase / dy)
     chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
     a = (k.area / k.c1)[:, None, None]
-    grows = kappa1 > kappa0
+    stiffens = kappa1 > kappa0
     kept = np.divide(kappa1, kappa0, out=np.zeros_like(kappa0), where=kappa0 > 0)
-    trial = np.where(grows, q + a * chord * de, q * kept + a * kappa1 * de)
-    cap = strength * after.G
+    trial = np.where(stiffens, q + a * chord * de, q * kept + a * kappa1 * de)
+    limit = strength * after.G
     size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
-    share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
+    scale = np.divide(limit, size, out=np.ones_like(size), where=size > limit)
     force = k.curve.force(after.y)[0] if k.yields else after.force
-    slips = at_limit(size, strength, after.G, force)
-    return Sliders(trial, size, strength, cap, share, chord, grows, near, slips)
+    slips = is_at_limit(size, strength, after.G, force)
+    return Sliders(trial, size, strength, limit, scale, chord, stiffens, is_small, slips)
 
 
-def strength(k: FacetTables, gamma: Array) -> Array:
+def friction_limit(k: FacetTables, gamma: Array) -> Array:
     """mu lam A gamma per facet (M, 1, B): the friction limit of q over G."""
     return k.mu * k.lam * k.area[:, None, None] * gamma[:, None]
 
 
-def resultant(k: FacetTables, now: Planes, force: Array, q: Array) -> Array:
+def sum_traction(k: FacetTables, now: Planes, force: Array, q: Array) -> Array:
     """Traction F (dim, B) of the normal forces A Phi n, force = Phi (M, B), and the sliders q."""
     F = np.einsum("dmb,mb->db", now.n, k.area[:, None] * force)
     return F + np.einsum("edmb,emb->db", now.basis, q.sum(axis=2)) / k.lam
 
 
-def at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
+def is_at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
     """Whether sliders whose |q| is `size` are at their friction limit, but for rounding.
 
-    force: Phi (M, B) of the virgin curve, whose rounding G has.
+    force: Phi (M, B) of the first-loading curve, whose rounding error G has.
     """
-    return size >= strength * (G * (1 - FRICTION_TOLERANCE) - ROUNDING_TOLERANCE * force[:, None])
+    tolerated = G * (1 - FRICTION_TOLERANCE) - ROUNDING_TOLERANCE * force[:, None]
+    return size >= strength * tolerated
 
 
-def friction_loss(k: FacetTables, before: Cells, after: Cells, q: Array, sliders: Sliders) -> Array:
-    """Energy (B,) in J/m2 that sliders, and springs that part under shear, lose in a step.
+def friction_dissipation(
+    k: FacetTables, before: Cells, after: Cells, q: Array, sliders: Sliders
+) -> Array:
+    """Energy (B,) in J/m2 dissipated by slip, and by springs that disengage under shear.
 
-    Where the stiffness grows, the force goes along the chord from q to its friction limit and
-    slides there. Each term is >= 0 as written, for kappa0 <= chord <= kappa1 then.
+    Where the stiffness increases, the force goes along the chord from q to its friction limit and
+    slides there. Each term is >= 0 as written, because then kappa0 <= chord <= kappa1.
     """
-    kappa0, chord, share = before.kappa, sliders.chord, sliders.share
-    q2, trial2 = q[0] ** 2 + q[1] ** 2, sliders.size**2
-    r0, r1, rc = reciprocal(kappa0), reciprocal(after.kappa), reciprocal(chord)
-    hardening = share * (share * trial2) * (rc - r1) + np.where(
-        kappa0 > MIN_DIVISOR, q2 * (r0 - rc), 0.0
-    )
-    softening = (kappa0 - after.kappa) * r0 * (q2 * r0)
-    lost = np.where(sliders.grows, np.where(chord > MIN_DIVISOR, hardening, 0.0), softening)
-    lost = lost + 2 * share * (1 - share) * (trial2 * np.where(sliders.grows, rc, r1))
-    return np.sum(compliance(k) * lost, axis=(0, 1))
+    kappa0 = before.kappa
+    chord = sliders.chord
+    scale = sliders.scale
+    q2 = q[0] ** 2 + q[1] ** 2
+    trial2 = sliders.size**2
+    r0 = reciprocal(kappa0)
+    r1 = reciprocal(after.kappa)
+    rc = reciprocal(chord)
+    elastic = np.where(kappa0 > MIN_DIVISOR, q2 * (r0 - rc), 0.0)
+    hardening = scale * (scale * trial2) * (rc - r1) + elastic
+    hardening = np.where(chord > MIN_DIVISOR, hardening, 0.0)
+    disengaged = (kappa0 - after.kappa) * r0 * (q2 * r0)
+    dissipated = np.where(sliders.stiffens, hardening, disengaged)
+    slip = trial2 * np.where(sliders.stiffens, rc, r1)
+    dissipated = dissipated + 2 * scale * (1 - scale) * slip
+    return np.sum(slider_compliance(k) * dissipated, axis=(0, 1))
 
 
-def stiffness(
+def tangent_of_fixed_planes(
     k: FacetTables, before: Cells, after: Cells, sliders: Sliders, de: Array, E: Array, end: Planes
 ) -> Array:
-    """Tangent C = dF/dd (dim, dim, B) of planes that keep their slopes.
+    """Tangent C = dF/dd (dim, dim, B) for planes whose slopes do not change.
 
     J_q = beta (I - s s^T) E + v g^T per cell, summed; E (2, dim, M, B) is d(de)/dd.
     """
-    trial, share, chord, grows = sliders.trial, sliders.share, sliders.chord, sliders.grows
-    y, kappa = after.y, after.kappa
+    trial = sliders.trial
+    scale = sliders.scale
+    chord = sliders.chord
+    stiffens = sliders.stiffens
+    slips = sliders.slips
+    direction = sliders.direction
+    y = after.y
+    kappa = after.kappa
     a = (k.area / k.c1)[:, None, None]
-    depth = k.depth[:, :, None]
+    depth = k.cell_depth[:, :, None]
     inside = (y[:, None] > depth[:, :-1]) & (y[:, None] < depth[:, 1:])
     p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
-    # rounding must not decide: a facet that did not close has not grown; q at its limit slips
-    stiffer = grows & ((y - before.y) > ROUNDING_TOLERANCE * np.abs(y))[:, None]
-    v = np.where(stiffer, a * chord_slope * de, p * reciprocal(kappa) * trial)
-    beta = np.where(sliders.cap > 0, a * np.where(grows, chord, kappa), 0.0)
-    slips, unit = sliders.slips, sliders.unit
-    v = np.where(slips, share * (v - unit * np.sum(unit * v, axis=0)), v)
-    v = v + np.where(slips, sliders.strength * kappa * unit, 0.0)
-    beta = np.where(slips, share * beta, beta)
-    outer = np.where(slips, unit[:, None] * unit[None], 0.0)
+        chord_slope = np.where(sliders.is_small, p / 2, (kappa - chord) / (y - before.y)[:, None])
+    # rounding must not decide: a facet that has not closed is not stiffer; q at its limit slips
+    closes = ((y - before.y) > ROUNDING_TOLERANCE * np.abs(y))[:, None]
+    v = np.where(stiffens & closes, a * chord_slope * de, p * reciprocal(kappa) * trial)
+    beta = np.where(sliders.limit > 0, a * np.where(stiffens, chord, kappa), 0.0)
+    v = np.where(slips, scale * (v - direction * np.sum(direction * v, axis=0)), v)
+    v = v + np.where(slips, sliders.strength * kappa * direction, 0.0)
+    beta = np.where(slips, scale * beta, beta)
+    outer = np.where(slips, direction[:, None] * direction[None], 0.0)
     inner = np.sum(beta * (np.eye(2)[:, :, None, None, None] - outer), axis=3)  # (2, 2, M, B)
     along = end.n * (k.area[:, None] * after.slope)
     along = along + np.einsum("edmb,emb->dmb", end.basis, np.sum(v, axis=2)) / k.lam
@@ -391,12 +472,17 @@ def stiffness(
     return C + np.einsum("eimb,efmb,fjmb->ijb", end.basis, inner, E) / k.lam
 
 
-def bending(
-    k: FacetTables, after: Cells, sliders: Sliders, q: Array, end: Planes, turned: Turning
+def tangent_of_rotation(
+    k: FacetTables,
+    after: Cells,
+    sliders: Sliders,
+    q: Array,
+    end: Planes,
+    derivatives: PlaneDerivatives,
 ) -> Array:
-    """Part (dim, dim - 1, B) of the tangent by which the planes at the end turn and flatten."""
-    limited = np.sum(sliders.push * after.G, axis=2)  # of q by log(gamma)
+    """Part (dim, dim - 1, B) of the tangent by which the planes at the end of the step rotate."""
+    limited = np.sum(sliders.push * after.G, axis=2)  # derivative of q by log(gamma)
     by_gamma = np.einsum("eimb,emb->imb", end.basis, limited / end.gamma) / k.lam
-    C = np.einsum("ijmb,mb->ijb", turned.n, k.area[:, None] * after.force)
-    C = C + np.einsum("eijmb,emb->ijb", turned.basis, q.sum(axis=2)) / k.lam
-    return C + np.einsum("imb,jmb->ijb", by_gamma, turned.gamma)
+    C = np.einsum("ijmb,mb->ijb", derivatives.n, k.area[:, None] * after.force)
+    C = C + np.einsum("eijmb,emb->ijb", derivatives.basis, q.sum(axis=2)) / k.lam
+    return C + np.einsum("imb,jmb->ijb", by_gamma, derivatives.gamma)

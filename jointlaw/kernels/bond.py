@@ -1,4 +1,4 @@
-"""The bond in a step: docs/theory-incremental.md, "The bond"."""
+"""The cohesive bond in a step: docs/theory-incremental.md, "Cohesive bond"."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from ..support.checks import Array
 from .element import Element, ElementResponse
 
 
-class Bonded(Element):
+class BondElement(Element):
     """The bond of a joint, with its damage."""
 
     native_name = "bonded"
@@ -20,14 +20,14 @@ class Bonded(Element):
         self.tensile_stiffness = bond.normal_stiffness
 
     def numbers(self) -> dict[str, float]:
-        begin, end = self.bond.limits
+        onset, failure = self.bond.limits
         return {
             "bond_normal_stiffness": self.bond.normal_stiffness,
             "bond_shear_stiffness": self.bond.shear_stiffness,
-            "inverse_onset_opening": float(begin[0]),
-            "inverse_onset_slip": float(begin[1]),
-            "inverse_failure_opening": float(end[0]),
-            "inverse_failure_slip": float(end[1]),
+            "inverse_onset_opening": float(onset[0]),
+            "inverse_onset_slip": float(onset[1]),
+            "inverse_failure_opening": float(failure[0]),
+            "inverse_failure_slip": float(failure[1]),
         }
 
     def step(
@@ -35,38 +35,41 @@ class Bonded(Element):
     ) -> ElementResponse:
         """As `Element.step`.
 
-        1. Damage D is what opening and slip ask for, and never less than before.
-        2. Traction is (1 - D) K u, u the displacement less its closure; stored is (1 - D) psi.
-        3. Lost is the integral of psi dD towards u, by the geometric mean of psi where the damage
-           begins and ends to grow: exact where one mode acts alone, else in the limit of small
-           steps.
+        1. Damage D follows from opening and slip (`damage_at`), and never decreases.
+        2. Traction is (1 - D) K u, u the displacement without closure; stored is (1 - D) psi.
+        3. Dissipated is the integral of psi dD in the direction of u, by the geometric mean of psi
+           where the damage begins and ends to grow: exact in one mode, else first-order accurate.
         4. Tangent is (1 - D) K, less K u (dD/du)^T where the damage grows.
         """
-        bond, old = self.bond, state[0]
-        u, K = self._opened(delta + d)
+        bond = self.bond
+        old = state[0]
+        u, K = self._opening_and_slip(delta + d)
         squares, psi = self._energy(u)
-        found, slope = damage_at(bond, squares)
-        grows = found > old
-        damage = new[0] = np.where(grows, found, old)
+        driven, slope = damage_at(bond, squares)
+        grows = driven > old
+        damage = np.where(grows, driven, old)
+        new[0] = damage
         softens = grows & (damage < 1.0)
-        first = np.where(grows, beyond(bond, squares, old), 1.0)
-        last = np.where(grows & ~softens, beyond(bond, squares, damage), 1.0)
-        lost = np.where(grows, (damage - old) * psi / np.sqrt(first * last), 0.0)
-        rate = u * half_axes(bond, damage)[[0, 1, 1][: len(u)]] ** 2
+        onset = np.where(grows, strength_ratio(bond, squares, old), 1.0)
+        final = np.where(grows & ~softens, strength_ratio(bond, squares, damage), 1.0)
+        dissipated = np.where(grows, (damage - old) * psi / np.sqrt(onset * final), 0.0)
+        rate = u * inverse_axes(bond, damage)[[0, 1, 1][: len(u)]] ** 2
         rate = np.divide(rate, slope, out=np.zeros_like(u), where=softens)
         acts = np.stack([u[0] < 0.0, *[damage >= 0.0] * (len(u) - 1)])
-        whole = np.eye(len(u))[:, :, None] * ((1.0 - damage) * K * acts)
-        return ElementResponse((1.0 - damage) * K * u, lost, whole - (K * u)[:, None] * rate[None])
+        secant = np.eye(len(u))[:, :, None] * ((1.0 - damage) * K * acts)
+        C = secant - (K * u)[:, None] * rate[None]
+        return ElementResponse((1.0 - damage) * K * u, dissipated, C)
 
-    def stored(self, delta: Array, state: Array) -> Array:
-        return (1.0 - state[0]) * self._energy(self._opened(delta)[0])[1]
+    def stored_energy(self, delta: Array, state: Array) -> Array:
+        u, _ = self._opening_and_slip(delta)
+        return (1.0 - state[0]) * self._energy(u)[1]
 
     def stiffness(self, delta: Array, state: Array) -> Array:
-        """As `Element.stiffness`; softening, which lowers it, is left out."""
+        """As `Element.stiffness`, without softening, which lowers it."""
         return (1.0 - state[0]) * max(self.bond.normal_stiffness, self.bond.shear_stiffness)
 
     def shear_stiffness(self, delta: Array, stress: float) -> float:
-        """As `Element.shear_stiffness`, of the whole bond."""
+        """As `Element.shear_stiffness`, of the intact bond."""
         return self.bond.shear_stiffness if len(delta) > 1 else 0.0
 
     def first_loading_stiffness(self, closure: Array, reduction: float) -> Array:
@@ -74,45 +77,45 @@ class Bonded(Element):
         shear = self.bond.shear_stiffness / reduction**2
         return np.full(closure.shape, max(self.bond.normal_stiffness, shear))
 
-    def _opened(self, delta: Array) -> tuple[Array, Array]:
+    def _opening_and_slip(self, delta: Array) -> tuple[Array, Array]:
         """Opening and slip u (dim, B), and their stiffnesses (dim, 1)."""
         u = np.concatenate([np.minimum(delta[:1], 0.0), delta[1:]])
         stiffness = [self.bond.normal_stiffness, *[self.bond.shear_stiffness] * (len(u) - 1)]
         return u, np.array(stiffness)[:, None]
 
     def _energy(self, u: Array) -> tuple[Array, Array]:
-        """Squares (2, B) of opening and slip, and psi (B,), the energy of the whole bond."""
+        """Squares (2, B) of opening and slip, and psi (B,), the energy of the intact bond."""
         squares = np.stack([u[0] * u[0], np.sum(u[1:] * u[1:], axis=0)])
         K = self.bond.normal_stiffness, self.bond.shear_stiffness
         return squares, 0.5 * (K[0] * squares[0] + K[1] * squares[1])
 
 
-def half_axes(bond: Bond, damage: Array) -> Array:
-    """One over the opening and the slip (2, B) that the strength of this damage (B,) allows."""
-    begin, end = (limit[:, None] for limit in bond.limits)
-    return begin - damage * (begin - end)
+def inverse_axes(bond: Bond, damage: Array) -> Array:
+    """One over the half axes (2, B) of the strength ellipse at this damage (B,): opening, slip."""
+    onset, failure = (limit[:, None] for limit in bond.limits)
+    return onset - damage * (onset - failure)
 
 
-def beyond(bond: Bond, squares: Array, damage: Array) -> Array:
-    """1 (B,) where opening and slip, squared (2, B), are the strength of this damage."""
-    p = half_axes(bond, damage)
-    return squares[0] * (p[0] * p[0]) + squares[1] * (p[1] * p[1])
+def strength_ratio(bond: Bond, squares: Array, damage: Array) -> Array:
+    """Left side of the strength ellipse (B,), for squares (2, B) of opening and slip; 1 on it."""
+    axes = inverse_axes(bond, damage)
+    return squares[0] * (axes[0] * axes[0]) + squares[1] * (axes[1] * axes[1])
 
 
 def damage_at(bond: Bond, squares: Array) -> tuple[Array, Array]:
-    """Damage d (B,) that opening and slip, squared (2, B), ask for: the smaller root of
+    """Damage D (B,) at which squares (2, B) of opening and slip are on the strength ellipse.
 
-    opening^2 (begin - d soft)^2 + slip^2 (begin - d soft)^2 = 1, soft = begin - end of each,
-    0 where they are within the strength and 1 where no root is below 1. Also half the slope of the
-    left side by -d at the root.
+    The smaller root of opening^2 (onset - D fall)^2 + slip^2 (onset - D fall)^2 = 1, with fall =
+    onset - failure of each mode; 0 within the strength of the intact bond, and 1 where no root is
+    below 1. Also half the derivative of the left side by -D at the root.
     """
-    begin, end = bond.limits
-    soft = begin - end
-    turn = begin[1] * end[0] - begin[0] * end[1]
-    inside = squares[0] * (soft[0] * soft[0]) + squares[1] * (soft[1] * soft[1])
-    slope = np.sqrt(np.maximum(inside - squares[0] * squares[1] * (turn * turn), 0.0))
-    over = beyond(bond, squares, np.zeros(1)) - 1.0
-    bottom = squares[0] * (begin[0] * soft[0]) + squares[1] * (begin[1] * soft[1]) + slope
-    softens = (over > 0.0) & (beyond(bond, squares, np.ones(1)) < 1.0)
-    found = np.divide(over, bottom, out=np.where(over > 0.0, 1.0, 0.0), where=softens)
-    return np.minimum(found, 1.0), slope
+    onset, failure = bond.limits
+    fall = onset - failure
+    mixed = onset[1] * failure[0] - onset[0] * failure[1]
+    quadratic = squares[0] * (fall[0] * fall[0]) + squares[1] * (fall[1] * fall[1])
+    slope = np.sqrt(np.maximum(quadratic - squares[0] * squares[1] * (mixed * mixed), 0.0))
+    excess = strength_ratio(bond, squares, np.zeros(1)) - 1.0
+    divisor = squares[0] * (onset[0] * fall[0]) + squares[1] * (onset[1] * fall[1]) + slope
+    softens = (excess > 0.0) & (strength_ratio(bond, squares, np.ones(1)) < 1.0)
+    damage = np.divide(excess, divisor, out=np.where(excess > 0.0, 1.0, 0.0), where=softens)
+    return np.minimum(damage, 1.0), slope

@@ -1,4 +1,4 @@
-"""An element: one of the parallel parts that a joint is the sum of."""
+"""An element: one of the parallel components whose tractions add up to the traction of a joint."""
 
 import math
 from abc import ABC, abstractmethod
@@ -10,87 +10,99 @@ from ..support.checks import Array
 
 
 class ElementResponse(NamedTuple):
-    """What an element of B joints adds in a step."""
+    """Contribution of an element to a step of B joints."""
 
-    F: Array  # (dim, B) in Pa
-    lost: Array  # (B,) in J/m2, >= 0
-    C: Array | None  # (dim, dim, B) in Pa/m, if asked for
+    F: Array  # traction (dim, B) in Pa
+    dissipated: Array  # (B,) in J/m2, >= 0
+    C: Array | None  # tangent (dim, dim, B) in Pa/m, None unless requested
 
 
 class Measures(NamedTuple):
-    """What the states of joints amount to, arrays (n,): docs/theory-incremental.md."""
+    """Scalar measures of the states of joints, arrays (n,): docs/theory-incremental.md."""
 
-    sliding: Array  # share of all facet orientations: in touch, every cell at its limit
-    slipping: Array  # share of the friction capacity that is at its limit
-    separated: Array  # share of all facet orientations: out of touch
-    stored: Array  # elastic energy, J/m2
-    reach: Array  # largest effective closure of any facet, m
+    sliding: Array  # weight fraction of the facets in touch with every cell at its friction limit
+    slipping: Array  # fraction of the friction capacity that is exhausted
+    separated: Array  # weight fraction of the facets that do not touch
+    stored_energy: Array  # elastic energy, J/m2
+    max_effective_closure: Array  # of all facets, m
 
 
 class Element(ABC):
-    """What every element says of itself; all else about a joint is a sum over its elements.
+    """Base class of elements: the properties and functions that every element declares.
 
-    Arrays have physical axes first and B joints last. `delta` (dim, B) is the displacement from the
-    mated position in m, `state` (rows, B) the element's own rows of the state; zeros are virgin.
+    All other quantities of a joint are sums over its elements. Arrays have physical axes first and
+    B joints last. `delta` (dim, B) is the displacement from the interlocked position in m, `state`
+    (rows, B) the rows of the state that belong to the element; zeros are the virgin state.
+
+    An element that bears tension sets `tensile_strength`, `tensile_opening` and
+    `tensile_stiffness`, and has a row named "damage" as its last row, 0 while it is intact and >= 1
+    once it has failed.
     """
 
-    native_name = ""  # of its number in native/layout.py; empty: it runs by the numpy kernel alone
-    dim = 1  # components of a displacement that it needs, at least
-    rows: dict[str, int]  # of its state: how many, by name
-    parted = 1.0  # damage of joints whose faces meet anew
+    native_name = ""  # its name in native/layout.py; empty if it has no C version
+    dim = 1  # least number of components of a displacement
+    rows: dict[str, int]  # number of rows of its state by name
+    separated_damage = 1.0  # damage of joints whose faces meet again after separation
     tensile_strength = 0.0  # Pa: largest tension of an intact joint
     tensile_opening = 0.0  # m: an intact joint bears tension up to this opening
     tensile_stiffness = 0.0  # Pa/m: normal stiffness of an intact joint up to that opening
-    stretch = 1.0  # bound of the closure that it feels over the size of the displacement
-    reach = math.inf  # m: up to this closure its forces, energies and their squares stay finite
-    farthest = 1e304  # m: largest closure that a normal stress is looked for in
+    closure_per_displacement = 1.0  # upper bound of |effective closure| over |displacement|
+    max_effective_closure = math.inf  # m: beyond it forces, energies or their squares overflow
+    max_search_closure = 1e304  # m: upper end of the search for the closure at a normal stress
 
     def numbers(self) -> dict[str, float]:
-        """Its numbers in `struct jlaw_law`, by the names of native/layout.py."""
+        """Numbers of the element in `struct jlaw_law`, by the names of native/layout.py."""
         return {}
 
     @abstractmethod
     def step(
         self, delta: Array, d: Array, state: Array, new: Array, tangent: bool
     ) -> ElementResponse:
-        """Advance from `delta` by d (dim, B) in m, from `state` to `new`, which is written."""
+        """Advance joints by a displacement increment.
+
+        delta: displacement (dim, B) in m before the step; d: increment (dim, B) in m; state: rows
+        before the step; new: rows after the step, which are written. Returns the traction after
+        the step, the dissipated energy, and with `tangent` the consistent tangent dF/dd.
+        """
 
     @abstractmethod
     def stiffness(self, delta: Array, state: Array) -> Array:
-        """Upper bound (B,) of `|C|` in Pa/m that it adds to joints in these states."""
+        """Upper bound (B,) of its part of `|C|` in Pa/m, for joints in these states."""
 
     def traction(self, delta: Array, state: Array) -> Array:
-        """Traction (dim, B) in Pa that a state carries: that of a step by nothing."""
+        """Traction (dim, B) in Pa of a state, from a zero increment."""
         return self.step(delta, np.zeros_like(delta), state, np.empty_like(state), False).F
 
     def normal_stress(self, closure: Array) -> Array:
         """Normal stress (...) in Pa of first loading to this closure (...) in m, unsheared."""
         d = np.zeros((self.dim, closure.size))
         d[0] = closure.ravel()
-        virgin = np.zeros((sum(self.rows.values()), d.shape[1]))
+        virgin = self._virgin_rows(closure.size)
         F = self.step(np.zeros_like(d), d, virgin, virgin.copy(), False).F
         return F[0].reshape(closure.shape)
 
     def largest_stiffness(self, closure: Array, shear: Array) -> Array:
         """Upper bound (...) of `|C|` in Pa/m up to this closure and this shear (...) in m."""
-        virgin = np.zeros((sum(self.rows.values()), 1))
-        return self.stiffness(np.zeros((self.dim, 1)), virgin)[0] + 0.0 * (closure + shear)
+        bound = self.stiffness(np.zeros((self.dim, 1)), self._virgin_rows(1))[0]
+        return bound + 0.0 * (closure + shear)
 
     def shear_stiffness(self, delta: Array, stress: float) -> float:
-        """Elastic shear stiffness in Pa/m of first loading to `delta` (dim, 1), a closure in m.
+        """Elastic shear stiffness in Pa/m after first loading to `delta` (dim, 1), a closure in m.
 
         stress: the normal stress in Pa that the element bears there. The default is the tangent of
         a zero increment.
         """
+        if len(delta) == 1:
+            return 0.0
         start = np.zeros_like(delta)
-        virgin = np.zeros((sum(self.rows.values()), 1))
+        virgin = self._virgin_rows(1)
         closed = virgin.copy()
         self.step(start, delta, virgin, closed, False)
         C = self.step(delta, start, closed, closed.copy(), True).C
-        return 0.0 if C is None or len(delta) == 1 else float(C[1, 1, 0])
+        return 0.0 if C is None else float(C[1, 1, 0])
 
     def first_loading_stiffness(self, closure: Array, reduction: float) -> Array:
-        """Upper bound (...) in Pa/m of the tangent's norm on first loading to this closure (...).
+        """Upper bound (...) of `|C|` in Pa/m during first loading to this closure (...) in m.
 
         reduction: the factor F of a strength reduction, by which a host divides shear displacement
         and shear stress (`Law.strength_reduced`); 1 for none.
@@ -98,10 +110,15 @@ class Element(ABC):
         bound = self.largest_stiffness(closure, np.zeros(()))
         return bound * max(1.0, reduction**-2)
 
-    def stored(self, delta: Array, state: Array) -> Array:
+    def stored_energy(self, delta: Array, state: Array) -> Array:
         """Elastic energy (B,) in J/m2."""
-        return self.measures(delta, state).stored
+        return self.measures(delta, state).stored_energy
 
     def measures(self, delta: Array, state: Array) -> Measures:
-        """What slips, touches and is stored; asked of the first element of a joint."""
-        raise NotImplementedError(f"{type(self).__name__} may only stand beside asperities")
+        """Measures (B,); needed only if the element is the first one of a law."""
+        raise NotImplementedError(
+            f"{type(self).__name__} has no measures: put it after the first element of the law"
+        )
+
+    def _virgin_rows(self, n: int) -> Array:
+        return np.zeros((sum(self.rows.values()), n))

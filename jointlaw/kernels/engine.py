@@ -1,8 +1,15 @@
-"""Which kernel advances a law's joints, and on how many threads.
+"""The kernel that advances the joints of a law, and the threads that it runs on.
 
-Both engines keep states in blocks and offer the same methods: "native" is the compiled law of
-`jointlaw/native`, "numpy" the readable reference. JOINTLAW_KERNEL chooses; by default native is
-taken where its library was built. JOINTLAW_THREADS bounds the threads.
+Two engines have the same methods: "native" is the compiled law of `jointlaw/native`, "numpy" the
+readable reference. JOINTLAW_KERNEL chooses; the default is native if its library was built. A law
+with an element without a C version runs in numpy. JOINTLAW_THREADS limits the threads.
+
+States are stored in blocks of eight joints, (blocks, rows, 8): a row of a block holds one number of
+eight joints side by side, so that the compiled law advances several joints by one vector
+instruction. A batch of one joint has a block of one. Joint i is in lane i % 8 of block i // 8. The
+compiled law keeps more rows in a block than a state has: the first-loading curve of every facet at
+the end of the last step, which halves the evaluations of the next one. `refresh` computes these
+rows from the state, so snapshots do without.
 """
 
 import ctypes
@@ -22,56 +29,76 @@ from ..support.checks import Array, one_of
 from . import reference
 from .pack import pack
 from .reference import LawTables
-from .threads import share_out, thread_count
+from .threads import run_on_threads, thread_count
 
 Index = NDArray[np.intp]
-LANES = 8  # joints of a block, which lie side by side: JLAW_JOINTS_PER_BLOCK in native/batch.h
-LINE = 64  # bytes that a processor reads at once
-CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
-GRAINS = 16  # of joints: a thread takes as many, one after the other, if all are equally fast
-SERIAL = 20_000  # sliders below which a second thread costs more than it saves
-MISSING = (
+JOINTS_PER_BLOCK = 8  # JLAW_JOINTS_PER_BLOCK in native/batch.h
+CACHE_LINE_BYTES = 64
+JOINTS_PER_NUMPY_CALL = 4096  # keeps the temporaries of the numpy kernel in cache
+CHUNKS_PER_THREAD = 16  # a thread fetches as many chunks of joints if all threads are equally fast
+MIN_SLIDERS_FOR_THREADS = 20_000  # with fewer a second thread costs more than it saves
+MISSING_LIBRARY = (
     "the compiled law was not built, and numpy's kernel is about forty times slower: install a C "
     "compiler or `pip install ziglang`, then run `python -m jointlaw.native`"
 )
 
 
-def blocks(n: int, rows: int, lanes: int = LANES) -> Array:
-    """Zeros for n states, (blocks, rows, lanes), which begin where a line of memory does."""
+def allocate_blocks(n: int, rows: int, lanes: int = JOINTS_PER_BLOCK) -> Array:
+    """Zeros for n states, (blocks, rows, lanes), aligned to a cache line."""
     shape = -(-n // lanes), rows, lanes
-    raw = np.zeros(math.prod(shape) + LINE // 8)
-    first = -raw.ctypes.data % LINE // 8
+    raw = np.zeros(math.prod(shape) + CACHE_LINE_BYTES // 8)
+    first = -raw.ctypes.data % CACHE_LINE_BYTES // 8
     return raw[first : first + math.prod(shape)].reshape(shape)
 
 
-def at(state: Array, index: Index, rows: Any = slice(None)) -> tuple[Index, Any, Index]:
-    """Where the blocks `state` hold these rows of the joints of `index`: (n, rows)."""
-    block, lane = np.divmod(index, state.shape[2])
+def block_index(state: Array, joints: Index, rows: Any = slice(None)) -> tuple[Index, Any, Index]:
+    """Index into the blocks `state` of these rows of these joints: (joints, rows)."""
+    block, lane = np.divmod(joints, state.shape[2])
     return block, rows, lane
 
 
 class Step:
-    """A step of m joints of one batch: increments in, results out. It may be taken many times.
+    """Arrays of a step of m joints of one batch. It may be repeated with new increments in d.
 
-    d (m, dim) in m; F (m, dim) and C (m, dim, dim), which are written, C None for no tangent;
-    where: the joints that move (m,), None for all; keep: whether the states advance. shown
-    (m, 6 + dim), written if given, as it costs little in the same pass: shares sliding, slipping
-    and separated, stored and dissipated energy (J/m2), damage of the bond, displacement (m).
+    d: increments (m, dim) in m. F: tractions (m, dim) in Pa, written. C: tangents (m, dim, dim) in
+    Pa/m, written; None for no tangent. where: indices (m,) of the joints, None for all. commit:
+    whether the states advance. measures: (m, 6 + dim), written unless None, at little cost in the
+    same pass: fractions sliding, slipping and separated, stored and dissipated energy (J/m2),
+    damage of bond or cohesion, displacement (m).
+
+    Raises ValueError for an array that is not C-contiguous, which the compiled law cannot use.
     """
 
     def __init__(
-        self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True,
-        shown: Array | None = None,
-    ) -> None:  # fmt: skip
-        self.d, self.F, self.C, self.shown, self.where, self.keep = d, F, C, shown, where, keep
-        self.call: tuple[Array | None, Any] = None, None  # of these states, for `NativeEngine`
+        self,
+        d: Array,
+        F: Array,
+        C: Array | None,
+        where: Index | None = None,
+        commit: bool = True,
+        measures: Array | None = None,
+    ) -> None:
+        for name, array in {"d": d, "F": F, "C": C, "where": where, "measures": measures}.items():
+            if array is not None and not array.flags.c_contiguous:
+                raise ValueError(f"{name} is not C-contiguous: give np.ascontiguousarray({name})")
+        self.d = d
+        self.F = F
+        self.C = C
+        self.measures = measures
+        self.where = where
+        self.commit = commit
+        # the states of the last call and the call, for `NativeEngine`
+        self.call: tuple[Array | None, Any] = None, None
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"call": (None, None)}  # it holds addresses
+        return self.__dict__ | {"call": (None, None)}  # a call holds addresses
 
 
 def engine(tables: LawTables) -> "NumpyEngine | NativeEngine":
-    """The engine of a law's tables, which all its joints share: it holds nothing of theirs."""
+    """The engine of a law's tables. All its joints share it, because it keeps no state of theirs.
+
+    Raises ImportError where JOINTLAW_KERNEL requires a kernel that is not available.
+    """
     choice = os.environ.get("JOINTLAW_KERNEL", "")
     if choice:
         one_of("JOINTLAW_KERNEL", choice, ("numpy", "native"))
@@ -90,119 +117,125 @@ def _engine(tables: LawTables, choice: str) -> "NumpyEngine | NativeEngine":
     if loaded is not None:
         return NativeEngine(tables, loaded)
     if choice == "native":
-        raise ImportError(f"JOINTLAW_KERNEL = 'native', but {MISSING}")
-    if choice == "":
-        _warn_once()
+        raise ImportError(f"JOINTLAW_KERNEL = 'native', but {MISSING_LIBRARY}")
+    _warn_once()
     return NumpyEngine(tables)
 
 
 @lru_cache(maxsize=1)
 def _warn_once() -> None:
-    warnings.warn(MISSING, stacklevel=2)
+    warnings.warn(MISSING_LIBRARY, stacklevel=2)
 
 
 class NumpyEngine:
-    """The reference: whole chunks of joints through `reference.step`."""
+    """The reference: `reference.step` for groups of joints."""
 
     name = "numpy"
 
     def __init__(self, tables: LawTables) -> None:
-        self.tables, self.rows = tables, tables.rows  # rows of a block
+        self.tables = tables
+        self.rows = tables.rows  # of a block
 
-    def advance(self, state: Array, step: Step, ledger: bool) -> None:
-        """Take a step; the ledger, the sum of the dissipated energy, is always kept."""
-        index = np.arange(len(step.d)) if step.where is None else step.where
-        for first in range(0, len(step.d), CHUNK):
-            part = slice(first, first + CHUNK)
-            place = at(state, index[part])
-            old = np.ascontiguousarray(state[place].T)
+    def advance(self, state: Array, step: Step, track_dissipation: bool) -> None:
+        """Advance joints by a step; the dissipated energy is always tracked."""
+        joints = np.arange(len(step.d)) if step.where is None else step.where
+        for first in range(0, len(step.d), JOINTS_PER_NUMPY_CALL):
+            part = slice(first, first + JOINTS_PER_NUMPY_CALL)
+            index = block_index(state, joints[part])
+            old = np.ascontiguousarray(state[index].T)
             new, F, C = reference.step(self.tables, old, step.d[part].T, step.C is not None)
             step.F[part] = F.T
             if step.C is not None and C is not None:
                 step.C[part] = np.moveaxis(C, 2, 0)
-            if step.keep:
-                state[place] = new.T
-            if step.shown is not None:
-                now = reference.parts(self.tables, new)
-                damage = np.minimum(getattr(now, "damage", np.ones(len(F.T))), 1.0)
-                shares = reference.measures(self.tables, new)[:4]
-                all_shown = np.stack([*shares, now.dissipated, damage, *now.delta])
-                step.shown[part] = all_shown.T
+            if step.commit:
+                state[index] = new.T
+            if step.measures is not None:
+                parts = reference.state_parts(self.tables, new)
+                damage = np.minimum(getattr(parts, "damage", np.ones(len(F.T))), 1.0)
+                measures = reference.measures(self.tables, new)[:4]
+                rows = [*measures, parts.dissipated_energy, damage, *parts.delta]
+                step.measures[part] = np.stack(rows).T
 
     def refresh(self, state: Array, n: int) -> None:
-        """Nothing is kept beside the states."""
+        """Do nothing: a block has no other rows than its states."""
 
-    def of_states(self, what: str, state: Array, n: int) -> Array:
-        """What the first n states amount to, joints first, by a function of `reference`:
+    def evaluate(self, quantity: str, state: Array, n: int) -> Array:
+        """A quantity of the first n states, joints first, by a function of `reference`.
 
         "traction" (n, dim) in Pa, "stiffness" (n,) in Pa/m or "measures" (n, 5).
         """
-        rows = np.ascontiguousarray(state[at(state, np.arange(n))].T)
-        return np.array(getattr(reference, what)(self.tables, rows)).T
+        rows = np.ascontiguousarray(state[block_index(state, np.arange(n))].T)
+        return np.array(getattr(reference, quantity)(self.tables, rows)).T
 
 
 class NativeEngine:
-    """The compiled law, on all threads where there is work for them."""
+    """The compiled law, on several threads if there are enough sliders."""
 
     name = "native"
 
     def __init__(self, tables: LawTables, loaded: ctypes.CDLL) -> None:
         numbers, arrays = pack(tables)
-        # kept, for the structure points to them
+        # referenced here because the structure holds their addresses
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
         pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
-        self._law, self._sliders = LawStruct(**numbers, **pointers), tables.sliders
-        self._library_run, self.lanes = loaded.jlaw_run, library.vector_lanes(loaded)
-        # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
-        # with flattened facets, the same at their depth
+        self._law = LawStruct(**numbers, **pointers)
+        self._sliders = tables.sliders
+        self._library_run = loaded.jlaw_run
+        self.lanes = library.vector_lanes(loaded)
+        # rows of a block: the state, then Phi and Phi' of all facets; with plastic indentation,
+        # Phi and Phi' at the indentation too
         facets = 0 if tables.asperities is None else len(tables.asperities.c1)
         self.rows = tables.rows + 2 * (1 + tables.yields) * facets
 
-    def advance(self, state: Array, step: Step, ledger: bool) -> None:
-        """Take a step; `ledger` adds up the dissipated energy."""
-        of, call = step.call
-        if of is not state:
-            arrays = (address(array) for array in (step.d, step.F, step.C, step.shown, step.where))
-            call = self._prepared(state, len(step.d), *arrays)
+    def advance(self, state: Array, step: Step, track_dissipation: bool) -> None:
+        """Advance joints by a step; without `track_dissipation` it stays as it is in the state."""
+        state_of_call, call = step.call
+        if state_of_call is not state:
+            arrays = step.d, step.F, step.C, step.measures, step.where
+            call = self._prepare_call(state, len(step.d), *map(address, arrays))
             step.call = state, call
-        call.track_dissipation, call.commit = ledger, step.keep
+        call.track_dissipation = track_dissipation
+        call.commit = step.commit
         self._run(library.ADVANCE, call)
 
     def refresh(self, state: Array, n: int) -> None:
-        """Bring Phi and Phi', kept beside the first n states, up to date with them."""
-        self._run(library.REFRESH, self._prepared(state, n))
+        """Compute Phi and Phi' in the blocks of the first n states from these states."""
+        self._run(library.REFRESH, self._prepare_call(state, n))
 
-    def of_states(self, what: str, state: Array, n: int) -> Array:
-        """As `NumpyEngine.of_states`; the traction is that of a step by nothing."""
-        call, *shape = {
+    def evaluate(self, quantity: str, state: Array, n: int) -> Array:
+        """As `NumpyEngine.evaluate`; the traction is that of a zero increment."""
+        operation, *shape = {
             "traction": (library.ADVANCE, n, self._law.dim),
             "stiffness": (library.STIFFNESS, n),
             "measures": (library.MEASURE, n, 5),
-        }[what]
+        }[quantity]
         out = np.empty(shape)
-        self._run(call, self._prepared(state, n, None, address(out)))
+        self._run(operation, self._prepare_call(state, n, None, address(out)))
         return out
 
-    def _prepared(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
-        """A call for n joints; arrays: where d, F, C, what is shown and the index begin."""
+    def _prepare_call(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
+        """A call for n joints; arrays: addresses of d, F, C, measures and the indices."""
         _, rows, lanes = state.shape
-        given = address(state), *arrays, *[None] * (5 - len(arrays))
+        addresses = address(state), *arrays, *[None] * (5 - len(arrays))
         return library.BatchCall(
-            ctypes.addressof(self._law), *given, n, 0, n, rows, lanes == 1, self.lanes
+            ctypes.addressof(self._law), *addresses, n, 0, n, rows, lanes == 1, self.lanes
         )
 
-    def _run(self, what: int, call: library.BatchCall) -> None:
-        """Call the library on one thread or several, which share the joints out."""
-        where, n = ctypes.addressof(call), call.n
-        threads = min(thread_count(), -(-n // LANES)) if n * self._sliders > SERIAL else 1
+    def _run(self, operation: int, call: library.BatchCall) -> None:
+        """Call the library on one thread or several, which fetch chunks of joints."""
+        call_address = ctypes.addressof(call)
         call.next = 0
+        threads = 1
+        if call.n * self._sliders > MIN_SLIDERS_FOR_THREADS:
+            threads = min(thread_count(), -(-call.n // JOINTS_PER_BLOCK))
         if threads == 1:
-            self._work(where, what)
+            self._work(call_address, operation)
             return
-        call.chunk = -(-n // (GRAINS * threads * LANES)) * LANES
-        share_out(partial(self._work, where, what), threads)
+        chunks = CHUNKS_PER_THREAD * threads
+        call.chunk = -(-call.n // (chunks * JOINTS_PER_BLOCK)) * JOINTS_PER_BLOCK
+        run_on_threads(partial(self._work, call_address, operation), threads)
 
-    def _work(self, where: int, what: int) -> None:
-        """Have the library take joints of a call until none are left."""
-        if self._library_run(where, what):
+    def _work(self, call_address: int, operation: int) -> None:
+        """Let the library process joints of a call until none is left."""
+        if self._library_run(call_address, operation):
             raise MemoryError("no memory for a copy of a block of states")

@@ -1,11 +1,11 @@
-"""The readable kernel: a joint is the sum of its elements. All others are tested against it.
+"""The readable kernel: a joint is the sum of its elements. All other kernels are tested against it.
 
-Symbols and order are those of docs/theory-incremental.md. Arrays carry physical axes first and B
+Symbols and order are as in docs/theory-incremental.md. Arrays carry physical axes first and B
 joints last. A state (rows, B) holds
 
-    delta (dim) | dissipated energy (1) | rows of the first element | of the second | ...
+    delta (dim) | dissipated energy (1) | rows of the first element | rows of the second | ...
 
-where delta is counted from the mated position.
+where delta is the displacement from the interlocked position.
 """
 
 from collections.abc import Iterator
@@ -18,44 +18,50 @@ import numpy as np
 
 from ..discretisation.tables import FacetTables
 from ..support.checks import Array
-from . import asperities
-from .asperities import Asperities
+from .asperities import AsperityElement
 from .element import Element, Measures
-from .mating import first_touch
+from .interlock import first_touch
 
 
 @dataclass(frozen=True, eq=False)
 class LawTables:
-    """All that a kernel reads of a law: its elements. The first tells what slips and touches."""
+    """Everything that a kernel reads of a law: its elements.
 
-    dim: int  # components of a displacement: 3, 2 in one plane, 1 for closure alone
+    dim: components of a displacement: 3, 2 in one plane, 1 for closure alone; elements: parallel
+    components, the first of which provides the measures of a joint.
+    """
+
+    dim: int
     elements: tuple[Element, ...]
 
     @cached_property
-    def names(self) -> dict[str, int]:
-        """Rows of a state by name, in their order: how many of each."""
-        own = [row for element in self.elements for row in element.rows.items()]
-        return {"delta": self.dim, "dissipated": 1, **dict(own)}
+    def row_counts(self) -> dict[str, int]:
+        """Number of rows of a state by name, in their order."""
+        rows = {"delta": self.dim, "dissipated_energy": 1}
+        for element in self.elements:
+            rows |= element.rows
+        return rows
 
     @cached_property
-    def first(self) -> dict[str, int]:
-        """Number of the first row of each name."""
-        return dict(zip(self.names, accumulate(self.names.values(), initial=0), strict=False))
+    def first_rows(self) -> dict[str, int]:
+        """Index of the first row of each name."""
+        counts = self.row_counts
+        return dict(zip(counts, accumulate(counts.values(), initial=0), strict=False))
 
     @cached_property
     def rows(self) -> int:
         """Numbers of a state."""
-        return sum(self.names.values())
+        return sum(self.row_counts.values())
 
     @property
     def asperities(self) -> FacetTables | None:
-        """The tables of the asperities, if the law has any."""
+        """Tables of the asperities, None for a law without asperities."""
         first = self.elements[0]
-        return first.k if isinstance(first, Asperities) else None
+        return first.k if isinstance(first, AsperityElement) else None
 
     @cached_property
     def python_only(self) -> list[str]:
-        """Names of the classes of elements without C: the law runs by the numpy kernel.
+        """Names of the classes of elements without a C version; such a law runs in numpy.
 
         A subclass of an element with C counts as one without, unless it has a `native_name` too.
         """
@@ -64,95 +70,109 @@ class LawTables:
 
     @property
     def sliders(self) -> int:
-        """Sliders of a joint, at least one."""
+        """Number of sliders of a joint, at least one."""
         return 1 if self.asperities is None else self.asperities.sliders
 
     @property
     def yields(self) -> bool:
-        """Whether asperities yield."""
+        """Whether asperities are elastic-perfectly plastic."""
         return self.asperities is not None and self.asperities.yields
 
     @property
-    def fades(self) -> bool:
-        """Whether slopes fade with the distance from the mated position."""
-        return self.asperities is not None and self.asperities.fades
+    def interlock_decays(self) -> bool:
+        """Whether the interlock decays with slip, over the mating length."""
+        return self.asperities is not None and self.asperities.interlock_decays
+
+    @property
+    def breaks(self) -> bool:
+        """Whether joints have a bond or cohesion, which can break."""
+        return "damage" in self.row_counts
 
     @property
     def unmated_start(self) -> Array:
-        """`delta` (dim,) in m of a joint whose faces have never met, at first touch.
+        """`delta` (dim,) in m at first touch of a joint whose faces have never met.
 
-        Zeros where nothing but a bond or cohesion is missing. Raises ValueError where nothing is.
+        Zeros for a law that always interlocks but whose bond or cohesion can break. Raises
+        ValueError for a law without either.
         """
         k = self.asperities
-        if k is None or ("damage" in self.names and not (k.fades and k.dim > 1)):
+        always_interlocks = k is None or not (k.interlock_decays and k.dim > 1)
+        if k is None or (self.breaks and always_interlocks):
             return np.zeros(self.dim)
         return first_touch(k)
 
     @property
-    def stretch(self) -> float:
-        """Bound of the closure that an element feels over the size of the displacement."""
-        return max(element.stretch for element in self.elements)
+    def closure_per_displacement(self) -> float:
+        """Upper bound of the effective closure of any element over the size of the displacement."""
+        return max(element.closure_per_displacement for element in self.elements)
 
-    def own(self, *states: Array) -> Iterator[tuple[Element, list[Array]]]:
-        """Every element with its own rows of these states, as views."""
-        at = self.dim + 1
+    def element_rows(self, *states: Array) -> Iterator[tuple[Element, list[Array]]]:
+        """Yield every element with its rows of these states, as views."""
+        begin = self.dim + 1
         for element in self.elements:
-            end = at + sum(element.rows.values())
-            yield element, [state[at:end] for state in states]
-            at = end
+            end = begin + sum(element.rows.values())
+            yield element, [state[begin:end] for state in states]
+            begin = end
 
 
 def step(k: LawTables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
     """Advance joints by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B).
 
-    The displacement grows by d; tractions, tangents and losses of the elements add up. Their own
-    numbered steps: `Asperities.step`, `Bonded.step`, `Coulomb.step`.
+    The displacement grows by d; tractions, tangents and dissipated energies of the elements add up.
+    Their steps are numbered in `AsperityElement.step`, `BondElement.step`, `CoulombElement.step`.
     """
-    new, dim = np.array(state), k.dim
+    dim = k.dim
+    new = np.array(state)
     new[:dim] += d
-    F, lost = np.zeros_like(d), np.zeros(d.shape[1])
+    F = np.zeros_like(d)
+    dissipated = np.zeros(d.shape[1])
     C = np.zeros((dim, dim, d.shape[1])) if tangent else None
-    for element, (before, after) in k.own(state, new):
-        share = element.step(state[:dim], d, before, after, tangent)
-        F, lost = F + share.F, lost + share.lost
-        if C is not None and share.C is not None:
-            C = C + share.C
-    new[dim] += lost
+    for element, (before, after) in k.element_rows(state, new):
+        response = element.step(state[:dim], d, before, after, tangent)
+        F = F + response.F
+        dissipated = dissipated + response.dissipated
+        if C is not None and response.C is not None:
+            C = C + response.C
+    new[dim] += dissipated
     return new, F, C
 
 
-def parts(k: LawTables, state: Array) -> SimpleNamespace:
-    """Views of the parts of a state array by name, as rows (B,) where there is one of a kind.
+def state_parts(k: LawTables, state: Array) -> SimpleNamespace:
+    """Views of the parts of states (rows, B) by name; a name with one row is an array (B,).
 
-    Those of asperities as `asperities.State` has them, and the share of the slopes that is left.
+    For asperities the parts of `AsperityState`, and the slope retention.
     """
-    named = {
-        name: state[at] if several == 1 and at else state[at : at + several]
-        for (name, several), at in zip(k.names.items(), k.first.values(), strict=True)
-    }
-    for element, (own,) in k.own(state):
-        if isinstance(element, Asperities):
-            now = asperities.parts(element.k, own)
-            named |= {**now._asdict(), "slopes": now.slopes}
-    return SimpleNamespace(**named)
+    parts = {}
+    for name, count in k.row_counts.items():
+        first = k.first_rows[name]
+        parts[name] = state[first] if count == 1 and first else state[first : first + count]
+    for element, (rows,) in k.element_rows(state):
+        if isinstance(element, AsperityElement):
+            asperities = element.unpack(rows)
+            parts |= {**asperities._asdict(), "slope_retention": asperities.slope_retention}
+    return SimpleNamespace(**parts)
 
 
 def traction(k: LawTables, state: Array) -> Array:
-    """Traction F (dim, B) in Pa that a state carries."""
-    bear = [element.traction(state[: k.dim], own) for element, (own,) in k.own(state)]
-    return np.sum(bear, axis=0)
+    """Traction F (dim, B) in Pa of states."""
+    delta = state[: k.dim]
+    tractions = [element.traction(delta, rows) for element, (rows,) in k.element_rows(state)]
+    return np.sum(tractions, axis=0)
 
 
 def stiffness(k: LawTables, state: Array) -> Array:
     """Upper bound (B,) of `|C|` in Pa/m of joints in these states."""
-    bounds = [element.stiffness(state[: k.dim], own) for element, (own,) in k.own(state)]
+    delta = state[: k.dim]
+    bounds = [element.stiffness(delta, rows) for element, (rows,) in k.element_rows(state)]
     return np.sum(bounds, axis=0)
 
 
 def measures(k: LawTables, state: Array) -> Measures:
-    """Shares, stored energy and reach of a batch of states (rows, B)."""
+    """Measures of a batch of states (rows, B)."""
     delta = state[: k.dim]
-    (first, (own,)), *others = k.own(state)
-    now = first.measures(delta, own)
-    beside = (element.stored(delta, own) for element, (own,) in others)
-    return now._replace(stored=sum(beside, start=now.stored))
+    (first, (rows,)), *others = k.element_rows(state)
+    result = first.measures(delta, rows)
+    stored_energy = result.stored_energy
+    for element, (rows,) in others:
+        stored_energy = stored_energy + element.stored_energy(delta, rows)
+    return result._replace(stored_energy=stored_energy)

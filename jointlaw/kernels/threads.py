@@ -1,4 +1,4 @@
-"""The threads that share the work on a large batch."""
+"""Threads that advance a large batch together."""
 
 import os
 from collections.abc import Callable
@@ -7,27 +7,31 @@ from functools import lru_cache
 
 
 def thread_count() -> int:
-    """Threads that a large batch may use: JOINTLAW_THREADS, or all processors of this process."""
-    asked = os.environ.get("JOINTLAW_THREADS", "")
-    if asked:
-        if not asked.isdigit() or int(asked) < 1:
-            raise ValueError(f"JOINTLAW_THREADS = {asked!r} is out of bounds: a whole number >= 1")
-        return int(asked)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Number of threads for a large batch: JOINTLAW_THREADS, or all processors of this process."""
+    setting = os.environ.get("JOINTLAW_THREADS", "")
+    if setting:
+        if not setting.isdigit() or int(setting) < 1:
+            raise ValueError(
+                f"JOINTLAW_THREADS = {setting!r} is out of bounds: a whole number >= 1"
+            )
+        return int(setting)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
-def share_out(work: Callable[[], object], threads: int) -> None:
-    """Call work() on this thread and on others, `threads` in all; wait for all."""
-    others = [_pool(os.getpid()).submit(work) for _ in range(1, threads)]
+def run_on_threads(work: Callable[[], object], threads: int) -> None:
+    """Call `work()` once on each of `threads` threads, this one included, and wait for all."""
+    futures = [_executor(os.getpid()).submit(work) for _ in range(1, threads)]
     try:
         work()
     finally:
-        wait(others)
-    for other in others:
-        other.result()
+        wait(futures)
+    for future in futures:
+        future.result()
 
 
 @lru_cache(maxsize=1)
-def _pool(process: int) -> ThreadPoolExecutor:
+def _executor(process: int) -> ThreadPoolExecutor:
     """Threads of this process: a forked child starts its own."""
     return ThreadPoolExecutor(max(thread_count() - 1, 1), "jointlaw")

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..joints.crushed import warn_if_crushed
 from ..joints.joint import Joint
 from ..joints.normal_control import NormalCondition, closing_increments
 from ..joints.state import NonFiniteError
+from ..joints.validity import warn_if_closed
 from ..support.checks import Array, at_least, integer, more_than, number, numbers
 from ..support.progress import track
 from .record import UNITS, TestRecord
@@ -172,7 +172,7 @@ class _Test:
         scalars = (
             measures.sliding,
             measures.separated,
-            measures.stored,
+            measures.stored_energy,
             joint.dissipated_energy,
         )
         self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *scalars]))
@@ -180,5 +180,5 @@ class _Test:
     def record(self) -> TestRecord:
         """The record of all rows so far."""
         table = np.array(self.rows).reshape(-1, len(UNITS))
-        warn_if_crushed(self.joint.law, table[:, 0])
+        warn_if_closed(self.joint.law, table[:, 0])
         return TestRecord(dict(zip(UNITS, table.T, strict=True)), self.azimuth, self.name)

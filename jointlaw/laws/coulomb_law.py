@@ -1,4 +1,4 @@
-"""Coulomb's joint, the law of the handbooks: what every rock engineer knows and compares with."""
+"""Coulomb's joint: the Mohr-Coulomb law of engineering practice."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.coulomb import Coulomb
+from ..kernels.coulomb import CoulombElement
 from ..kernels.reference import LawTables
-from ..parameters.bond import LARGEST
+from ..parameters.bond import MAX_PARAMETER
 from ..parameters.declared import check, declared, parameter
 from ..support.checks import more_than
 from .law import DEFAULT_STRESS, Law
@@ -20,67 +20,86 @@ from .law import DEFAULT_STRESS, Law
 @declared
 @dataclass(frozen=True)
 class CoulombLaw(Law, kind="coulomb"):
-    """A joint of constant stiffness that slides at shear stress c + mu sigma (Coulomb).
+    """A joint of constant stiffness that slips at the shear stress c + mu sigma (Mohr-Coulomb).
 
-    In opening it bears tension while it is intact, then nothing. By default cohesion and friction
-    stay while it slides; residual values follow the peak at once, or over `weakening`. Faces that
-    have parted, or that meet anew, have no cohesion any more. There is no dilation.
-    docs/theory-incremental.md, "Coulomb's joint", tells how it differs from a `Bond`.
+    An intact joint bears tension. By default cohesion and friction are constant in slip; residual
+    values follow the peak at once, or over the slip `weakening`. After separation the faces have no
+    cohesion. There is no dilation. docs/theory-incremental.md, "Coulomb joint", compares it with a
+    `Bond`.
 
     Raises ValueError when a parameter is out of bounds.
 
     >>> made = jl.CoulombLaw(normal_stiffness=1e10, shear_stiffness=5e9, friction=0.7, cohesion=1e5)
     """
 
-    normal_stiffness: float = parameter("stiffness in closure", "Pa/m", above=0.0, high=LARGEST)
-    shear_stiffness: float = parameter("stiffness in shear", "Pa/m", above=0.0, high=LARGEST)
-    friction: float = parameter(
-        "coefficient, tan(phi); infinite: the joint never slides", low=0.0, infinite=True
+    normal_stiffness: float = parameter(
+        "stiffness in closure", "Pa/m", above=0.0, high=MAX_PARAMETER
     )
-    cohesion: float = parameter("c", "Pa", 0.0, low=0.0, high=LARGEST)
+    shear_stiffness: float = parameter("stiffness in shear", "Pa/m", above=0.0, high=MAX_PARAMETER)
+    friction: float = parameter(
+        "coefficient, tan(phi); infinite: the joint never slips", low=0.0, infinite=True
+    )
+    cohesion: float = parameter("c", "Pa", 0.0, low=0.0, high=MAX_PARAMETER)
     tension: float = parameter(
-        "strength in opening; what is beyond cohesion/friction does not count",
-        "Pa", 0.0, low=0.0, high=LARGEST,
-    )  # fmt: skip
+        "tensile strength; limited to cohesion/friction",
+        "Pa",
+        0.0,
+        low=0.0,
+        high=MAX_PARAMETER,
+    )
     residual_friction: float | None = parameter(
-        "friction after the peak, at most that of the peak; None keeps it", "", None,
-        low=0.0, high=LARGEST,
-    )  # fmt: skip
+        "friction after the peak, at most the peak friction; None: the peak friction",
+        "",
+        None,
+        low=0.0,
+        high=MAX_PARAMETER,
+    )
     residual_cohesion: float | None = parameter(
-        "cohesion after the peak, at most that of the peak; None keeps it", "Pa", None,
-        low=0.0, high=LARGEST,
-    )  # fmt: skip
+        "cohesion after the peak, at most the peak cohesion; None: the peak cohesion",
+        "Pa",
+        None,
+        low=0.0,
+        high=MAX_PARAMETER,
+    )
     weakening: float = parameter(
-        "shear displacement after the peak over which friction and cohesion fall linearly to the "
-        "residual ones; 0: at once", "m", 0.0, low=0.0, high=LARGEST,
-    )  # fmt: skip
+        "slip after the peak over which friction and cohesion decrease linearly to the residual "
+        "values; 0: at once",
+        "m",
+        0.0,
+        low=0.0,
+        high=MAX_PARAMETER,
+    )
     plane: float | None = parameter(
         "None for motion in 3-D, or the azimuth of the one plane in which the joint moves: vectors "
-        "then have two components, closure and shear along the plane", "rad", None,
-    )  # fmt: skip
+        "then have two components, closure and shear along the plane",
+        "rad",
+        None,
+    )
 
     def __post_init__(self) -> None:
         check(self)
         for name in ("friction", "cohesion"):
-            left, most = getattr(self, f"residual_{name}"), getattr(self, name)
-            if left is not None and left > most:
+            residual = getattr(self, f"residual_{name}")
+            peak = getattr(self, name)
+            if residual is not None and residual > peak:
                 raise ValueError(
-                    f"residual_{name} = {left!r} is out of bounds: it must be <= {name} = {most!r}"
+                    f"residual_{name} = {residual!r} is out of bounds: it must be <= {name} = "
+                    f"{peak!r}"
                 )
 
     @property
     def closure_range(self) -> float:
-        """Closure (m) at 20 MPa, by which tests and tables choose their steps."""
+        """Closure (m) at 20 MPa; tests and tables choose their steps by it."""
         return DEFAULT_STRESS / self.normal_stiffness
 
     @cached_property
     def tables(self) -> LawTables:
         """As `Law.tables`."""
         dim = 3 if self.plane is None else 2
-        return LawTables(dim, (Coulomb(self, dim),))
+        return LawTables(dim, (CoulombElement(self, dim),))
 
     def secant_stiffness(self, normal_stress: float) -> tuple[float, float]:
-        """As `Law.secant_stiffness`: the two constants."""
+        """As `Law.secant_stiffness`: the two parameters."""
         if len(self.tables.elements) > 1:
             return super().secant_stiffness(normal_stress)
         more_than("normal_stress", normal_stress, 0.0)
@@ -94,7 +113,7 @@ class CoulombLaw(Law, kind="coulomb"):
         """
         if len(self.tables.elements) > 1:
             return super().first_loading_stiffness(closure, reduction)
-        y = self._within_reach(closure)
+        y = self._require_finite_forces_at(closure)
         shear = self.shear_stiffness / more_than("reduction", reduction, 0.0) ** 2
         return np.full(y.shape, max(self.normal_stiffness, shear))[()]
 

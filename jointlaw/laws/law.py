@@ -1,4 +1,10 @@
-"""What every joint law offers: joints, states as plain arrays, stiffness, files."""
+"""Base class of joint laws: joints, steps, stiffness, strength and files of every law.
+
+A law is a frozen dataclass of declared parameters (`parameters/declared.py`). Its `tables` list the
+elements whose tractions add up to the traction of a joint (`kernels/element.py`), and all that is
+here follows from the parameters and the elements. A class of a user's own needs `closure_range`,
+`tables`, and for strength reduction `strength_reduced`.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +17,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..discretisation.first_loading import closure_at
+from ..discretisation.first_loading_response import find_closure
 from ..discretisation.tables import VERSION
-from ..joints.batch import JointBatch, stable_step
+from ..joints.batch import JointBatch, stable_time_step
 from ..joints.joint import Joint
-from ..joints.seat import seat
+from ..joints.preload import preload
 from ..kernels.engine import Step, engine
 from ..kernels.reference import LawTables
 from ..parameters import keys, toml
@@ -27,13 +33,12 @@ DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
 class Law:
-    """A law: a frozen dataclass of parameters. `JointLaw` is one, `CoulombLaw` another.
+    """Base class of joint laws, frozen dataclasses of parameters: `JointLaw`, `CoulombLaw`.
 
-    Reading and writing of files, and all that follows from the tables of a law, is here. Each class
-    has `plane` besides.
+    A subclass has a parameter `plane`, and a name for files: `class Own(jl.Law, kind="own")`.
     """
 
-    kinds: ClassVar[dict[str, type[Law]]] = {}  # by the names that files have
+    kinds: ClassVar[dict[str, type[Law]]] = {}  # by their names in files
 
     def __init_subclass__(cls, kind: str, **others: Any) -> None:
         super().__init_subclass__(**others)
@@ -42,85 +47,92 @@ class Law:
     @property
     @abstractmethod
     def closure_range(self) -> float:
-        """Largest closure (m) that the law is made for."""
+        """Largest closure (m) for which the law is discretised."""
 
     @cached_property
     @abstractmethod
     def tables(self) -> LawTables:
-        """What the kernels read."""
+        """Elements of the law, for the kernels."""
 
     # ----------------------------------------------------------------- joints
 
     def joint(self, normal_stress: float = 0.0, mated: bool = True) -> Joint:
         """One joint of this law, unsheared, closed to this normal stress (Pa, >= 0).
 
-        The stress is met to rounding: where asperities yield, by the joint's own cells. Its closure
-        then differs a little from `closure(normal_stress)`, that of many cells. Without `mated` its
-        faces have never met: it starts at first touch, 100 mating lengths from the mated
-        position along axis 2 (`unmated_start`), and without bond or cohesion. Raises ValueError as
-        `closure` does, for a law whose faces always fit, and for an unmated joint that is to be
-        closed already.
+        The stress is met to rounding by the cells of the joint. If asperities yield, its closure
+        differs a little from `closure(normal_stress)`, the limit of many cells. mated: False for
+        faces that have never met. Such a joint starts at first touch, 100 mating lengths from the
+        interlocked position along axis 2 (`unmated_start`), and without bond or cohesion. Raises
+        ValueError as `closure` does, for a law whose faces always interlock, and for an unmated
+        joint under a normal stress.
         """
         return Joint(self.joints(1, normal_stress=normal_stress, mated=mated))
 
     def joints(
         self,
         n: int,
-        ledger: bool = True,
+        track_dissipation: bool = True,
         normal_stress: ArrayLike = 0.0,
         mated: ArrayLike = True,
     ) -> JointBatch:
         """A batch of n joints of this law, advanced together; they start as `joint` does.
 
-        normal_stress: one for all or (n,), in Pa; mated: for all or (n,). Without `ledger`
-        dissipated energy is not added up, which is faster.
+        track_dissipation: as of `JointBatch`; normal_stress: one for all or (n,), in Pa; mated: for
+        all or (n,).
         """
-        batch = JointBatch(self, n, ledger)
-        far, stress = ~booleans("mated", mated, n), finite("normal_stress", normal_stress, "Pa")
-        if far.any():
+        batch = JointBatch(self, n, track_dissipation)
+        is_unmated = ~booleans("mated", mated, n)
+        stress = finite("normal_stress", normal_stress, "Pa")
+        if is_unmated.any():
             if stress.any():
                 raise ValueError(
                     f"normal_stress = {normal_stress!r} with mated=False: an unmated joint starts "
                     "at first touch; close it by update, or by a laboratory test such as "
                     "direct_shear"
                 )
-            batch.reset(np.flatnonzero(far), mated=False)
+            batch.reset(np.flatnonzero(is_unmated), mated=False)
         if stress.any():
-            seat(batch, normal_stress)
+            preload(batch, normal_stress)
         return batch
 
     def step(
         self, states: ArrayLike, d: ArrayLike, tangent: bool = True
     ) -> tuple[Array, Array, Array | None]:
-        """One step as a pure function, for a host that keeps the states itself.
+        """One step as a pure function, for a host that stores the states itself.
 
         states: (n, state_size), or (state_size,) for one joint; zeros are the virgin state.
         d: displacement increments in m, (n, dim) or (dim,).
         Returns the new states, F in Pa (n, dim) or (dim,), and C in Pa/m (n, dim, dim) or
-        (dim, dim), None without `tangent`; what was given stays as it was. The algorithm and its
+        (dim, dim), None without `tangent`; the arguments do not change. The algorithm and its
         equations: `jointlaw.kernels.reference.step`; it runs compiled, on all threads. Raises
         ValueError for a wrong shape, a number that is not finite, or a step whose forces overflow.
         """
-        old, move = finite("states", states, "numbers of state"), finite("d", d, "m")
-        rows, dim, joints = self.state_size, self.dim, old.shape[:-1]
-        if old.ndim not in (1, 2) or old.shape[-1] != rows or move.shape != (*joints, dim):
+        old = finite("states", states, "numbers of state")
+        increment = finite("d", d, "m")
+        rows = self.state_size
+        dim = self.dim
+        joints = old.shape[:-1]
+        if old.ndim not in (1, 2) or old.shape[-1] != rows or increment.shape != (*joints, dim):
             raise ValueError(
-                f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
+                f"states have shape {old.shape} and d {increment.shape}; expected (n, {rows}) and "
                 f"(n, {dim}), or ({rows},) and ({dim},) for one joint"
             )
-        old, move = old.reshape(-1, rows), np.ascontiguousarray(move).reshape(-1, dim)
-        size = np.abs(old[:, :dim]).max(axis=1) + np.abs(move).max(axis=1)
-        if (far := ~(self.tables.stretch * size <= self.largest_reach)).any():
-            joint = int(np.argmax(far))
+        old = old.reshape(-1, rows)
+        increment = np.ascontiguousarray(increment).reshape(-1, dim)
+        size = np.abs(old[:, :dim]).max(axis=1) + np.abs(increment).max(axis=1)
+        overflows = ~(self.tables.closure_per_displacement * size <= self.max_effective_closure)
+        if overflows.any():
+            joint = int(np.argmax(overflows))
             raise ValueError(
-                f"joint {joint}: the step d = {move[joint]} m leads beyond largest_reach = "
-                f"{self.largest_reach:g} m, where forces overflow; take a smaller step"
+                f"joint {joint}: the step d = {increment[joint]} m leads beyond "
+                f"max_effective_closure = {self.max_effective_closure:g} m, where forces overflow; "
+                "take a smaller step"
             )
-        new, F = np.array(old, order="C"), np.empty((*joints, dim))
+        new = np.array(old, order="C")
+        F = np.empty((*joints, dim))
         C = np.empty((*joints, dim, dim)) if tangent else None
-        each = None if C is None else C.reshape(-1, dim, dim)
-        step = Step(move, F.reshape(-1, dim), each)
-        engine(self.tables).advance(new[:, :, None], step, ledger=True)
+        step = Step(increment, F.reshape(-1, dim), None if C is None else C.reshape(-1, dim, dim))
+        engine(self.tables).advance(new[:, :, None], step, track_dissipation=True)
         return new.reshape(*joints, rows), F, C
 
     @property
@@ -130,42 +142,44 @@ class Law:
 
     @property
     def state_size(self) -> int:
-        """Numbers of state of one joint, as `step` takes them and a snapshot holds them."""
+        """Numbers of the state of one joint, as `step` and snapshots have it."""
         return self.tables.rows
 
     @property
     def unmated_start(self) -> Array:
         """`delta` (dim,) in m of a joint whose faces have never met, at first touch.
 
-        Closure is counted from the mated position, where the highest asperities face the deepest
-        hollows: this one is negative. Raises ValueError for an infinite mating length.
+        Closure counts from the interlocked position, in which the highest asperities are in the
+        deepest hollows, so this one is negative. Raises ValueError for an infinite mating length.
         """
         return self.tables.unmated_start
 
-    # ----------------------------------------------------- virgin closure curve
+    # --------------------------------------------------------- first-loading curve
 
     def normal_stress(self, closure: ArrayLike) -> Any:
-        """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared.
+        """Normal stress (Pa) on the first-loading curve, at a closure (m) without shear.
 
-        With a yield_interference that of the first loading, of infinitely many depth cells: a
-        joint's own few slip a little later. Bond and tension make it negative where the joint
-        opens.
+        If asperities yield it is the limit of many cells; the few cells of a joint slip a little
+        later. A bond or tensile strength makes it negative for an opening.
         """
-        return self._first_loading(self._within_reach(closure))[()]
+        return self._first_loading(self._require_finite_forces_at(closure))[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
-        """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above.
+        """Closure (m) at a normal stress (Pa, >= 0): the inverse of `normal_stress`.
 
         Raises ValueError for a stress that yielding asperities never reach.
         """
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
-        farthest = min(element.farthest for element in self.tables.elements)
-        return closure_at(self._first_loading, stress, farthest)[()]
+        max_search_closure = min(element.max_search_closure for element in self.tables.elements)
+        return find_closure(self._first_loading, stress, max_search_closure)[()]
 
-    def crushed(self, closure: float) -> float:
-        """Share of the asperities in touch at this closure (m), if they have heights; else 0."""
+    def contact_fraction(self, closure: float) -> float:
+        """Fraction of the asperities in contact at this closure (m); 0 for a law without heights.
+
+        The law is not valid where nearly all asperities are in contact (docs/limits.md).
+        """
         return 0.0
 
     # ----------------------------------------------- tension, strength, stiffness
@@ -192,7 +206,7 @@ class Law:
         """Secant stiffness in closure and elastic stiffness in shear (Pa/m) at a normal stress.
 
         normal_stress: in Pa, > 0, of first loading without shear. Shear stiffness is that of joints
-        that do not slide; 0 for a law of closure alone. Raises ValueError as `closure` does.
+        that do not slip; 0 for a law of closure alone. Raises ValueError as `closure` does.
         """
         stress = more_than("normal_stress", normal_stress, 0.0)
         closure = self.closure(stress)
@@ -206,14 +220,15 @@ class Law:
         return float(stress / closure), shear
 
     def first_loading_stiffness(self, closure: ArrayLike, reduction: float = 1.0) -> Any:
-        """Upper bound (Pa/m) of the eigenvalues of C in first loading to this closure (m).
+        """Upper bound (Pa/m) of the eigenvalues of C on the first-loading curve, at a closure (m).
 
         It bounds the frequency of a mass on the joint. At a given normal stress the unsheared joint
-        is the stiffest one, so a bound at its stress holds for sheared joints as well.
-        reduction: the factor F (> 0) of a strength reduction, inside which this law stands; shear
-        displacement and shear stress are divided by it. Raises ValueError as `normal_stress` does.
+        is the stiffest one, so that the bound at this stress holds for sheared joints as well.
+        reduction: the factor F (> 0) of a strength reduction with this law inside
+        (`strength_reduced`), which divides shear displacement and shear stress by F. Raises
+        ValueError as `normal_stress` does.
         """
-        y = self._within_reach(closure)
+        y = self._require_finite_forces_at(closure)
         factor = more_than("reduction", reduction, 0.0)
         each = [one.first_loading_stiffness(y, factor) for one in self.tables.elements]
         return np.sum(each, axis=0)[()]
@@ -221,10 +236,11 @@ class Law:
     def strength_reduced(self, factor: float) -> Self:
         """The law to use inside a reduction of the strength by `factor`, F > 0.
 
-        A host that divides shear displacements by F, and the shear stress that this law returns for
-        them by F, has a joint whose strength and dilation (tan phi, c, tension, tan psi) are those
-        of the law divided by F, and which is as stiff. No energy is created, as work is the same
-        inside and outside. Exact for Coulomb's joint; docs/blocks.md has the errors of rough ones.
+        A host divides shear displacements by F before the step of this law, and the shear stress
+        that the step returns by F. Its joint then has the strength and dilation of the law (tan
+        phi, c, tension, tan psi) divided by F, and the same stiffness. The work is the same inside
+        and outside, so no energy is created. Exact for Coulomb's joint; docs/blocks.md has the
+        errors for rough joints.
 
         Raises NotImplementedError for a class that does not define it.
         """
@@ -238,15 +254,17 @@ class Law:
     def max_stiffness(self, closure: ArrayLike, shear: ArrayLike = 0.0) -> Any:
         """Upper bound of `|C|` (Pa/m) up to this closure (m) and this shear displacement (m, >= 0).
 
-        The shear is the largest distance from the mated position, in any direction. Yielded and
-        worn joints, and those of a broken bond, are less stiff. A joint that weakens, of a bond or
-        by Coulomb's law, falls by a slope of its own, which may be larger than this bound.
+        shear: largest distance from the interlocked position, in any direction. Plastic
+        indentation, degradation and damage decrease the stiffness. The softening of a bond or of
+        Coulomb's joint has a negative slope, whose size may exceed this bound.
         """
-        y, way = self._within_reach(closure), finite("shear", shear, "m")
-        if not (way >= 0).all():
+        y = self._require_finite_forces_at(closure)
+        distance = finite("shear", shear, "m")
+        if not (distance >= 0).all():
             raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
-        self._within_reach(y + self.tables.stretch * way)
-        return np.sum([one.largest_stiffness(y, way) for one in self.tables.elements], axis=0)[()]
+        self._require_finite_forces_at(y + self.tables.closure_per_displacement * distance)
+        bounds = [element.largest_stiffness(y, distance) for element in self.tables.elements]
+        return np.sum(bounds, axis=0)[()]
 
     def critical_time_step(
         self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
@@ -254,33 +272,36 @@ class Law:
         """Largest stable explicit step (s) of one translating mass on one joint.
 
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: of the joint in m2; closure: the largest
-        reached, in m, negative for unmated joints; shear: the largest shear displacement reached,
-        in m, in any direction; numbers or arrays of one shape. 2 sqrt(m/(K area)), infinite where
-        nothing touches; a block code adds rotation. Shear presses one side of the asperities
-        together: a step for closure alone is several times too long for a joint that was sheared
-        far at constant closure. `JointBatch.critical_time_step` takes joints as they are now.
+        closure of the run, in m, negative for unmated joints; shear: the largest shear displacement
+        of the run, in m, in any direction; numbers or arrays of one shape. The result is
+        2 sqrt(m/(K area)), infinite where the stiffness is zero; a block code adds rotation. Shear
+        compresses one side of the asperities: a step for closure alone is several times too long
+        for a joint that was sheared far at constant closure. `JointBatch.critical_time_step` is the
+        same for joints in their present state.
 
-        Safe to 0.95 in lasting contact, and where friction takes from every impact. Impacts that
-        lose nothing need 0.2 or less: they last but 2/share steps (docs/limits.md).
+        A fraction of 0.95 is stable in lasting contact, and where friction dissipates energy in
+        every impact. Impacts without dissipation need 0.2 or less, because they last only
+        2/fraction steps (docs/limits.md).
         """
-        return stable_step(mass, area, self.max_stiffness(closure, shear))[()]
+        return stable_time_step(mass, area, self.max_stiffness(closure, shear))[()]
 
     @cached_property
-    def largest_reach(self) -> float:
+    def max_effective_closure(self) -> float:
         """Effective closure (m) up to which forces, energies and their squares stay finite."""
-        return min(element.reach for element in self.tables.elements)
+        return min(element.max_effective_closure for element in self.tables.elements)
 
     def _first_loading(self, closure: Array) -> Array:
-        """`normal_stress` of closures that are within reach."""
+        """As `normal_stress`, without a check of the closures."""
         return np.sum([one.normal_stress(closure) for one in self.tables.elements], axis=0)
 
-    def _within_reach(self, closure: ArrayLike) -> Array:
-        """Closures (m) that are finite and whose forces are."""
+    def _require_finite_forces_at(self, closure: ArrayLike) -> Array:
+        """Closures (m) as an array; raises ValueError unless they and their forces are finite."""
         y = finite("closure", closure, "m")
-        if (y > self.largest_reach).any():
+        if (y > self.max_effective_closure).any():
             raise ValueError(
-                f"closure = {float(y.max())!r} m is out of bounds: it must be <= largest_reach = "
-                f"{self.largest_reach:g} m, beyond which squares of forces overflow"
+                f"closure = {float(y.max())!r} m is out of bounds: it must be <= "
+                f"max_effective_closure = {self.max_effective_closure:g} m, beyond which squares "
+                "of forces overflow"
             )
         return y
 
@@ -290,20 +311,20 @@ class Law:
     def fingerprint(self) -> str:
         """Version of the discretisation, and a hash of the parameters that differ from default.
 
-        States fit only joints of the law that wrote them.
+        A state can be restored only by a law with the fingerprint of the law that wrote it.
         """
         return f"{VERSION}:{fingerprint(self)}"
 
-    def shown(self) -> Mapping[str, Any]:
-        """Values that files show in other words than the constructor keeps."""
+    def toml_values(self) -> Mapping[str, Any]:
+        """Values that files have in another form than the attributes."""
         return {}
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """The law as TOML text, also written to `path` if given.
 
-        Raises ValueError for heights of a class that no file can name.
+        Raises ValueError for heights of a class without a name in files.
         """
-        text = toml.law_text(self, Law.kinds, self.shown())
+        text = toml.law_text(self, Law.kinds, self.toml_values())
         if path is not None:
             replace_file(Path(path), text.encode())
         return text
@@ -312,7 +333,7 @@ class Law:
     def from_toml(cls, path: str | Path) -> Self:
         """A law from a TOML file; the keys are the parameters.
 
-        The file's key `kind` says of which class: "joint", the default, or "coulomb".
+        The key `kind` of the file names the class: "joint", the default, or "coulomb".
         """
         if "\n" in str(path):
             raise ValueError("this is TOML text, not the path of a law file: use from_text")
@@ -325,10 +346,10 @@ class Law:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "law") -> Self:
-        """A law from the mapping that such a file holds; `where` is named in error messages."""
+        """A law from the mapping of such a file; `where` names it in error messages."""
         law: Self = toml.law_of(Law.kinds, data, where)
         return law
 
     def __getstate__(self) -> dict[str, Any]:
-        # without cached values, which are computed again when needed
+        # without cached values, which can be computed again
         return {name: getattr(self, name) for name in parameters_of(self)}

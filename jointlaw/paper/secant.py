@@ -66,8 +66,8 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
     C^e includes separated asperities and C^p subtracts them, as in Eq. 22 and 23; K_n (Eq. 33) is
     lam K max(d_n, 0)^eta, so they contribute at eta = 0 only. At delta = 0 all are separated.
 
-    Raises ValueError for a wrong shape, a number that is not finite or beyond `law.largest_reach`,
-    an unknown `contact`, or "series" with eta >= 1.
+    Raises ValueError for a wrong shape, a number that is not finite or beyond
+    `law.max_effective_closure`, an unknown `contact`, or "series" with eta >= 1.
 
     >>> F = jl.secant(law, [2e-7, 1e-7, 0.0]).F
     """
@@ -76,10 +76,11 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
         raise ValueError(f"law: {type(law).__name__} has no asperities; give a JointLaw")
     if d.shape != (3,) or not np.isfinite(d).all():
         raise ValueError(f"delta = {delta!r} must be three finite numbers (m): closure, two shears")
-    if not np.abs(d).sum() <= law.largest_reach:
+    if not np.abs(d).sum() <= law.max_effective_closure:
         raise ValueError(
             f"delta = {delta!r} m is out of bounds: its components must add up to no more than "
-            f"law.largest_reach = {law.largest_reach:g} m, beyond which squares of forces overflow"
+            f"law.max_effective_closure = {law.max_effective_closure:g} m, beyond "
+            "which squares of forces overflow"
         )
     one_of("contact", contact, ("exact", "series"))
     asperity = law.asperity

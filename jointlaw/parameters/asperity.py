@@ -33,9 +33,9 @@ class Asperity:
     mu: float = parameter("friction coefficient of the asperity contact", low=0.0, fit=(1e-3, 5.0))
     yield_interference: float = parameter(
         "largest elastic compression of a spring of the contact, along the asperity normal; beyond "
-        "it the spring yields at constant force and keeps a set. Infinite is elastic. Yielding has "
-        "no end: where nearly all asperities touch (`jointlaw.joints.crushed`) the rock between "
-        "them, which the law leaves out, would bear",
+        "it the spring is perfectly plastic: constant force, permanent compression. Infinite: "
+        "elastic. Plastic indentation has no limit, but where nearly all asperities touch "
+        "(docs/limits.md) the rock between them, which the law does not model, would bear",
         "m",
         math.inf,
         above=0.0,

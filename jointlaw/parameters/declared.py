@@ -1,7 +1,7 @@
-"""A parameter, said once: what it is, its unit, bounds and default.
+"""Declared parameters: description, unit, bounds and default of each, in one place.
 
-A dataclass whose fields come from `parameter` and that `declared` decorates lists them in its
-docstring. Checks, TOML files, fingerprints, tables and fits go through the same list.
+A dataclass whose fields are made by `parameter`, with the decorator `declared`, lists them in its
+docstring. Checks, TOML files, fingerprints, tables and fits use the same declarations.
 """
 
 import hashlib
@@ -17,23 +17,23 @@ _WIDTH = 96
 
 
 class Parameter(NamedTuple):
-    """What is said of a parameter."""
+    """Declaration of a parameter."""
 
     about: str
     unit: str
-    kind: Any  # float, int, bool, what else it must be an instance of, or such by names of files
+    kind: Any  # float, int, bool, another class, or classes by their names in files
     choices: tuple[str, ...]
     low: float
     high: float
     above: bool  # whether `low` itself is out of bounds
-    infinite: bool  # whether infinity is a value
-    fit: tuple[float, float] | None  # bounds in a fit; None where no fit finds it
-    log: bool  # whether a fit looks for the logarithm of the value plus `shift`
+    infinite: bool  # whether infinity is allowed
+    fit: tuple[float, float] | None  # bounds in a fit; None if it cannot be fitted
+    log: bool  # whether a fit varies the logarithm of the value plus `shift`
     shift: float
 
     @property
     def bounds(self) -> str:
-        """The bounds in words, empty if there are none."""
+        """The bounds as text, empty if there are none."""
         low = f"{'>' if self.above else '>='} {self.low:g}" if self.low > -math.inf else ""
         high = f"<= {self.high:g}" if self.high < math.inf else ""
         return f"{low} and {high}" if low and high else low or high
@@ -54,27 +54,45 @@ def parameter(
     log: bool = True,
     shift: float = 0.0,
 ) -> Any:
-    """A field of a dataclass that is a parameter, `above` or from `low` to `high`."""
-    said = Parameter(
-        about, unit, kind, choices, low if above is None else above, high, above is not None,
-        infinite, fit, log, shift,
-    )  # fmt: skip
-    return field(default=default, metadata={"parameter": said})
+    """Declare a field of a dataclass as a parameter.
+
+    about: description; unit: in SI; default: without one the parameter is required. kind: float,
+    int, bool, another class, or a mapping of classes by their names in files; choices: allowed
+    texts. above, low, high: bounds, `above` itself excluded; infinite: whether infinity is allowed.
+    fit: bounds in a fit, None if it cannot be fitted; log, shift: a fit varies the logarithm of the
+    value plus `shift`.
+    """
+    declaration = Parameter(
+        about=about,
+        unit=unit,
+        kind=kind,
+        choices=choices,
+        low=low if above is None else above,
+        high=high,
+        above=above is not None,
+        infinite=infinite,
+        fit=fit,
+        log=log,
+        shift=shift,
+    )
+    return field(default=default, metadata={"parameter": declaration})
 
 
 def parameters_of(kind: Any) -> dict[str, Parameter]:
     """The declared parameters of a dataclass, or of an instance, by name."""
     return {
-        one.name: one.metadata["parameter"] for one in fields(kind) if "parameter" in one.metadata
+        item.name: item.metadata["parameter"]
+        for item in fields(kind)
+        if "parameter" in item.metadata
     }
 
 
 def declared(kind: type[T]) -> type[T]:
-    """Add the list of its parameters to the docstring of a dataclass."""
+    """Add the list of its parameters to the docstring of a dataclass: a decorator."""
     lines = []
-    for name, said in parameters_of(kind).items():
-        limits = "; ".join(part for part in (said.unit, said.bounds) if part)
-        text = f"{name}: {said.about}{f' ({limits})' if limits else ''}."
+    for name, declaration in parameters_of(kind).items():
+        limits = "; ".join(text for text in (declaration.unit, declaration.bounds) if text)
+        text = f"{name}: {declaration.about}{f' ({limits})' if limits else ''}."
         lines.append(fill(text, _WIDTH, initial_indent="    ", subsequent_indent=" " * 8))
     text = (kind.__doc__ or "").rstrip()
     head, mark, tail = text.partition("\n\n    Raises")
@@ -90,39 +108,48 @@ def check(values: Any, path: str = "") -> None:
     Numbers become floats. A parameter whose default is None may be None. Raises ValueError naming
     the parameter, its value and its bound.
     """
-    optional = {one.name for one in fields(values) if one.default is None}
-    for name, said in parameters_of(values).items():
-        value, where = getattr(values, name), f"{path}.{name}" if path else name
+    optional = {item.name for item in fields(values) if item.default is None}
+    for name, declaration in parameters_of(values).items():
+        value = getattr(values, name)
+        where = f"{path}.{name}" if path else name
         if value is None and name in optional:
             continue
-        if said.kind is float:
-            value = within(where, value, said)
+        if declaration.kind is float:
+            value = within(where, value, declaration)
             object.__setattr__(values, name, value)
-        elif said.kind is int:
-            object.__setattr__(values, name, integer(where, value, int(said.low)))
-        elif said.choices:
-            object.__setattr__(values, name, one_of(where, value, said.choices))
-        elif said.kind is bool and not isinstance(value, bool):
+        elif declaration.kind is int:
+            object.__setattr__(values, name, integer(where, value, int(declaration.low)))
+        elif declaration.choices:
+            object.__setattr__(values, name, one_of(where, value, declaration.choices))
+        elif declaration.kind is bool and not isinstance(value, bool):
             raise ValueError(f"{where} = {value!r} must be True or False")
-        elif isinstance(said.kind, type) and not isinstance(value, said.kind):
+        elif isinstance(declaration.kind, type) and not isinstance(value, declaration.kind):
             or_none = ", or None" if name in optional else ""
-            raise ValueError(f"{where} = {value!r} must be of type {said.kind.__name__}{or_none}")
+            raise ValueError(
+                f"{where} = {value!r} must be of type {declaration.kind.__name__}{or_none}"
+            )
 
 
-def within(name: str, value: Any, said: Parameter) -> float:
-    """The value as a float within the bounds of the parameter."""
-    result = number(name, value, infinite=said.infinite)
-    if result < said.low or (said.above and result == said.low) or result > said.high:
-        unit = f" {said.unit}" if said.unit else ""
-        raise ValueError(f"{name} = {result!r}{unit} is out of bounds: it must be {said.bounds}")
+def within(name: str, value: Any, declaration: Parameter) -> float:
+    """The value as a float. Raises ValueError if it is outside the bounds of the parameter."""
+    result = number(name, value, infinite=declaration.infinite)
+    if (
+        result < declaration.low
+        or (declaration.above and result == declaration.low)
+        or result > declaration.high
+    ):
+        unit = f" {declaration.unit}" if declaration.unit else ""
+        raise ValueError(
+            f"{name} = {result!r}{unit} is out of bounds: it must be {declaration.bounds}"
+        )
     return result
 
 
 def fingerprint(parameters: Any) -> str:
-    """Hash of a dataclass of parameters and of those within it.
+    """Hash of a dataclass of parameters, including dataclasses inside it.
 
-    Fields at their default are left out, so that a parameter that is added later, and is off by
-    default, leaves the hashes of all laws without it as they were.
+    Fields at their default are left out. So a parameter that is added later, and inactive by
+    default, does not change the hashes of laws without it.
     """
     return hashlib.sha256(_text(parameters).encode()).hexdigest()
 
@@ -131,8 +158,8 @@ def _text(value: Any) -> str:
     if not is_dataclass(value):
         return repr(value + 0.0 if isinstance(value, float) else value)  # -0.0 is 0.0
     parts = []
-    for one in fields(value):
-        now = getattr(value, one.name)
-        if one.compare and (one.default is MISSING or now != one.default):
-            parts.append(f"{one.name}={_text(now)}")
+    for item in fields(value):
+        current = getattr(value, item.name)
+        if item.compare and (item.default is MISSING or current != item.default):
+            parts.append(f"{item.name}={_text(current)}")
     return f"{type(value).__name__}({', '.join(parts)})"

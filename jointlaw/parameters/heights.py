@@ -1,4 +1,4 @@
-"""Distributions of asperity heights: which share of the asperities touches at an overlap r."""
+"""Distributions of asperity heights: fraction of the asperities in contact at an overlap r."""
 
 from dataclasses import dataclass
 from typing import Any, Self, TypeAlias
@@ -12,12 +12,12 @@ from .declared import check, declared, parameter
 
 FORMATIONS = ("population", "individual")
 FORMATION = (
-    '"population": the count of asperities in touch grows as P(r0 + y) and all carry the same '
-    'closure y, Eq. 37 as printed; "individual": each asperity feels only the closure since it '
-    "touched"
+    '"population": the number of asperities in contact grows as P(r0 + y) and all have the same '
+    'closure y, Eq. 37 as printed; "individual": each asperity has only the closure since its '
+    "first contact"
 )
 
-# Probabilities at both ends of a distribution; integrals are split at these quantiles
+# Probabilities at both ends of a distribution: integrals are split at these quantiles
 _TAILS = np.array([1e-15, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 0.5])
 
 
@@ -45,13 +45,14 @@ class GammaHeights:
     def from_moments(
         cls, mean: float, variance: float, overlap: float = 0.0, formation: str = "population"
     ) -> Self:
-        """The gamma distribution of this mean (m) and variance (m^2): Eq. 13.
+        """The gamma distribution with this mean (m) and variance (m^2): Eq. 13.
 
         overlap (m), formation: as of the class. Raises ValueError for a number out of its bounds.
 
         >>> heights = jl.GammaHeights.from_moments(150e-6, (70e-6) ** 2, overlap=40e-6)
         """
-        mean, variance = more_than("mean", mean, 0.0), more_than("variance", variance, 0.0)
+        mean = more_than("mean", mean, 0.0)
+        variance = more_than("variance", variance, 0.0)
         return cls(mean**2 / variance - 1, variance / mean, overlap, formation)
 
     @property
@@ -71,22 +72,23 @@ class GammaHeights:
         return np.where(np.asarray(r) >= 0, np.exp(log_density) / self.beta, 0.0)[()]
 
     def cdf(self, r: ArrayLike) -> Any:
-        """Share P(r) of asperities in touch at the overlap r in m, Eq. 11. Raises nothing."""
+        """Fraction P(r) of asperities in contact at the overlap r in m, Eq. 11. Raises nothing."""
         return special.gammainc(self.alpha + 1, np.maximum(r, 0.0) / self.beta)
 
     def breakpoints(self) -> Array:
         """Heights in m, ascending, between which the density is smooth on one scale."""
         k = self.alpha + 1
-        low, high = special.gammaincinv(k, _TAILS), special.gammainccinv(k, _TAILS[::-1])
+        low = special.gammaincinv(k, _TAILS)
+        high = special.gammainccinv(k, _TAILS[::-1])
         return np.unique(self.beta * np.concatenate([[0.0], low, high]))
 
 
 @declared
 @dataclass(frozen=True)
 class Heights:
-    """A measured histogram of asperity heights; it stands for any other distribution, too.
+    """A measured histogram of asperity heights, which also represents any other distribution.
 
-    Raises ValueError for a histogram that is none.
+    Raises ValueError for an invalid histogram.
 
     >>> heights = jl.Heights(np.histogram(np.array([1.0, 2.0, 2.5, 4.0]) * 1e-6, bins=3),
     ...                     formation="individual")
@@ -100,8 +102,11 @@ class Heights:
     )
     formation: str = parameter(
         f"{FORMATION}. A histogram has steps, which make most closure curves by population concave",
-        "", "individual", kind=str, choices=FORMATIONS,
-    )  # fmt: skip
+        "",
+        "individual",
+        kind=str,
+        choices=FORMATIONS,
+    )
 
     def __post_init__(self) -> None:
         check(self, "heights")
@@ -114,10 +119,10 @@ class Heights:
         return density[np.searchsorted(edges, np.asarray(r), side="right")]
 
     def cdf(self, r: ArrayLike) -> Any:
-        """Share P(r) of the asperities in touch at the overlap r in m. Raises nothing."""
+        """Fraction P(r) of asperities in contact at the overlap r in m. Raises nothing."""
         counts, edges = (np.array(v) for v in self.distribution)
-        reached = np.concatenate([[0.0], np.cumsum(counts) / counts.sum()])
-        return np.interp(np.asarray(r, float), edges, reached)
+        cumulative = np.concatenate([[0.0], np.cumsum(counts) / counts.sum()])
+        return np.interp(np.asarray(r, float), edges, cumulative)
 
     def breakpoints(self) -> Array:
         """Heights in m, ascending, between which the density is smooth on one scale."""
@@ -125,33 +130,33 @@ class Heights:
 
 
 HeightDistribution: TypeAlias = Any  # see `require_heights`
-# Kinds of heights by the names that files have, the default first
+# Classes of heights by their names in files, the default first
 KINDS = {"gamma": GammaHeights, "histogram": Heights}
-ROUGHLY = 0.1  # share of the asperities: a density may be infinite at a breakpoint
-_ASKED = ("overlap", "formation", "pdf", "cdf", "breakpoints")
+MAX_DENSITY_ERROR = 0.1  # fraction of asperities: a density may be infinite at a breakpoint
+_REQUIRED_NAMES = ("overlap", "formation", "pdf", "cdf", "breakpoints")
 
 
 def require_heights(heights: Any) -> None:
-    """Refuse what is neither None nor a distribution of heights, with what it lacks.
+    """Raise ValueError unless `heights` is None or a distribution of heights.
 
-    A class of the user's own has `overlap` (m) and `formation`, `pdf(r)` in 1/m and `cdf(r)` of
+    A class of a user's own has `overlap` (m) and `formation`, `pdf(r)` in 1/m and `cdf(r)` of
     arrays r (m), and `breakpoints()`: heights in m, ascending, between which its density is smooth
-    on one scale. Two of equal numbers are equal and hash alike, as a frozen dataclass is.
+    on one scale. It compares and hashes by its numbers, as a frozen dataclass does.
     """
     if heights is None:
         return
-    missing = [name for name in _ASKED if not hasattr(heights, name)]
+    missing = [name for name in _REQUIRED_NAMES if not hasattr(heights, name)]
     if missing:
         raise ValueError(
             f"heights = {heights!r} has no {', '.join(missing)}: give GammaHeights, Heights, None, "
             "or a class with these (a histogram in Heights stands for any other distribution)"
         )
     kind = type(heights)
-    own = {getattr(kind, name) for name in ("__hash__", "__repr__")}
-    if own & {None, object.__hash__, object.__repr__}:
+    methods = {getattr(kind, name) for name in ("__hash__", "__repr__")}
+    if methods & {None, object.__hash__, object.__repr__}:
         raise ValueError(
-            f"heights = {heights!r}: two of equal numbers must be equal, hash and print alike; "
-            f"make {kind.__name__} a frozen dataclass"
+            f"heights = {heights!r}: objects with equal numbers must be equal, hash and print "
+            f"alike; make {kind.__name__} a frozen dataclass"
         )
     at_least("heights.overlap", heights.overlap, 0.0)
     one_of("heights.formation", heights.formation, FORMATIONS)
@@ -162,21 +167,23 @@ def require_heights(heights: Any) -> None:
     if (np.diff(points) <= 0).any() or points[0] < 0:
         raise ValueError("heights.breakpoints() must be ascending heights, >= 0 m")
     if kind not in KINDS.values():
-        _require_slope(heights, points)
+        _require_consistent_density(heights, points)
 
 
-def _require_slope(heights: Any, points: Array) -> None:
-    """Refuse a density that is plainly not the slope of the share in touch."""
+def _require_consistent_density(heights: Any, points: Array) -> None:
+    """Raise ValueError for a density that is clearly not the derivative of `cdf`."""
     x, weight = np.polynomial.legendre.leggauss(16)
     half = 0.5 * np.diff(points)
     density = np.asarray(heights.pdf(points[:-1, None] + half[:, None] * (x + 1.0)), float)
-    found, told = half * (density @ weight), np.diff(heights.cdf(points))
-    if not (np.abs(found - told) <= ROUGHLY).all() or (density < 0.0).any():
-        worst = int(np.argmax(np.nan_to_num(np.abs(found - told), nan=np.inf)))
+    integral = half * (density @ weight)
+    increase = np.diff(heights.cdf(points))
+    error = np.abs(integral - increase)
+    if not (error <= MAX_DENSITY_ERROR).all() or (density < 0.0).any():
+        worst = int(np.argmax(np.nan_to_num(error, nan=np.inf)))
         raise ValueError(
             f"heights: pdf(r) in 1/m must be >= 0 and the slope of cdf(r), but from "
-            f"{points[worst]:g} to {points[worst + 1]:g} m it adds up to {found[worst]:.4g}, and "
-            f"cdf grows by {told[worst]:.4g}"
+            f"{points[worst]:g} to {points[worst + 1]:g} m its integral is {integral[worst]:.4g}, "
+            f"and cdf increases by {increase[worst]:.4g}"
         )
 
 

@@ -1,7 +1,7 @@
-"""Tables of TOML files, checked: which keys there are, which are needed, what each may be.
+"""Validation of TOML files: known and required keys, and a rule for the value of each.
 
-Every TOML file of the project is read here. Errors name the file, the key by its path, and what to
-write instead. A rule for the value of a key is one of
+Every TOML file of the project is read here. Errors name the file, the path of the key, and a
+remedy. A rule for the value of a key is one of
 
     a function (name, value)    returns the value, or raises ValueError; the name has file and key
     a mapping of rules          for a table
@@ -20,7 +20,7 @@ Table = dict[str, Any]
 
 
 def read(path: Path, what: str = "TOML file") -> Table:
-    """The table of a file. Raises ValueError if there is none, or it is not TOML in UTF-8."""
+    """Read the table of a file. Raises ValueError if it does not exist or is no TOML in UTF-8."""
     if not path.is_file():
         raise ValueError(f"{what} {str(path)!r} does not exist")
     try:
@@ -30,24 +30,26 @@ def read(path: Path, what: str = "TOML file") -> Table:
 
 
 def parse(text: str, where: str) -> Table:
-    """The table of TOML text; `where` is named in errors."""
+    """Parse the table of TOML text; `where` names it in errors."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{where} is not valid TOML: {error}") from None
 
 
-def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> Table:
-    """A table whose keys are those of `rules`, and whose values pass them.
+def validate_table(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> Table:
+    """Validate a table by the rule for each key, and return it with the validated values.
 
-    rules: rule by key; a key that ends in "!" is needed. where: file, and path: of the table in
-    it, as errors name them.
+    rules: rule by key; a key that ends in "!" is required. where: name of the file, and path: path
+    of the table in the file, for error messages.
+
+    Raises ValueError for an unknown, missing or invalid key.
     """
     if not isinstance(data, dict):
         raise ValueError(f"{where}: key {path!r} must be a table")
     prefix = f"{path}." if path else ""
     rule_of = {key.rstrip("!"): rule for key, rule in rules.items()}
-    found: Table = {}
+    validated: Table = {}
     for key, value in data.items():
         name = prefix + key
         if key not in rule_of:
@@ -56,26 +58,30 @@ def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> 
             )
         rule = rule_of[key]
         if isinstance(rule, Mapping):
-            found[key] = checked(value, rule, where, name)
+            validated[key] = validate_table(value, rule, where, name)
         elif isinstance(rule, list):
             if not isinstance(value, list):
                 raise ValueError(f"{where}: key {name!r} must be a list of tables")
-            found[key] = [
-                checked(one, rule[0], where, f"{name}[{i}]") for i, one in enumerate(value)
+            validated[key] = [
+                validate_table(item, rule[0], where, f"{name}[{i}]") for i, item in enumerate(value)
             ]
         else:
-            found[key] = rule(f"{where}: {name}", value)
+            validated[key] = rule(f"{where}: {name}", value)
     for key in rules:
         if key.endswith("!") and key[:-1] not in data:
             raise ValueError(f"{where}: key '{prefix}{key[:-1]}' is missing; give it a value")
-    return found
+    return validated
 
 
-def as_given(name: str, value: Any) -> Any:
-    """A rule: any value; the constructor that takes it checks it."""
+def any_value(name: str, value: Any) -> Any:
+    """A rule for any value, which the constructor validates."""
     return value
 
 
 def keys_of(kind: Any) -> dict[str, Any]:
-    """Rules for a table with the fields of a dataclass, which checks their values itself."""
-    return {one.name + ("!" if one.default is MISSING else ""): as_given for one in fields(kind)}
+    """Rules for a table with the fields of a dataclass, which validates their values itself."""
+    rules = {}
+    for item in fields(kind):
+        is_required = item.default is MISSING
+        rules[item.name + ("!" if is_required else "")] = any_value
+    return rules

@@ -17,7 +17,7 @@ def largest_c(b: float) -> float:
 
 
 def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, float, float]:
-    """Return a, b and c of Eq. 14 within the bounds of Eq. 18; `smooth` admits an infinite a."""
+    """Validate a, b and c of Eq. 14 by the bounds of Eq. 18; `smooth` allows an infinite a."""
     a = at_least("orientation.a", a, 1.0, infinite=smooth)
     b, c = number("orientation.b", b), number("orientation.c", c)
     if not -1.0 <= b <= 2.0:
@@ -26,7 +26,7 @@ def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, flo
             "or the density turns negative"
         )
     bound = largest_c(b)
-    if abs(c) > bound + 1e-12:  # 1e-12 admits the bound itself typed in decimals
+    if abs(c) > bound + 1e-12:  # 1e-12 allows the bound itself in decimals
         raise ValueError(
             f"orientation.c = {c!r} is out of bounds: |c| <= 1/3 - b/6 = {bound:.9g} "
             "(Eq. 18), or the density turns negative"
@@ -35,7 +35,7 @@ def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, flo
 
 
 def shape(u: Array, b: float) -> Array:
-    """Density of Eq. 14 over u = cos(a theta), mean of all azimuths: 1 for b = 0."""
+    """Density of Eq. 14 over u = cos(a theta), averaged over the azimuths: 1 for b = 0."""
     return 1.0 + 0.5 * b * (3.0 * u**2 - 1.0)
 
 
@@ -53,13 +53,21 @@ class Orientation:
         "extent of the inclinations, theta <= pi/(2a); large a is smooth", low=1.0, fit=(1.0, 100.0)
     )
     b: float = parameter(
-        "shape within that extent; b = 2 crowds the contacts towards the joint normal", "", 0.0,
-        low=-1.0, high=2.0, fit=(-1.0, 2.0), log=False,
-    )  # fmt: skip
+        "shape within this extent; b = 2 concentrates the contacts at the joint normal",
+        "",
+        0.0,
+        low=-1.0,
+        high=2.0,
+        fit=(-1.0, 2.0),
+        log=False,
+    )
     c: float = parameter(
-        "azimuthal anisotropy, within +-(1/3 - b/6); c > 0 makes axis 2 (azimuth 0) the stiffer",
-        "", 0.0, fit=(-0.5, 0.5), log=False,
-    )  # fmt: skip
+        "azimuthal anisotropy, within +-(1/3 - b/6); c > 0 makes axis 2 (azimuth 0) stiffer",
+        "",
+        0.0,
+        fit=(-0.5, 0.5),
+        log=False,
+    )
 
     def __post_init__(self) -> None:
         for name, value in zip("abc", bounded(self.a, self.b, self.c), strict=True):
@@ -67,18 +75,19 @@ class Orientation:
 
     @classmethod
     def from_moments(cls, mean: float, variance: float, c: float = 0.0) -> Self:
-        """The a and b that give inclinations of this mean (rad) and variance (rad^2): Eq. 17.
+        """The density with this mean (rad) and variance (rad^2) of the inclinations: Eq. 17.
 
-        c: as of the class. Where two values of b fit (the variance over the squared mean peaks near
-        b = 1.4), the smaller is taken. Raises ValueError where none fits.
+        c: as of the class. If two values of b have these moments (the variance over the squared
+        mean has its maximum near b = 1.4), the smaller one is used. Raises ValueError if none has.
 
         >>> orientation = jl.Orientation.from_moments(mean=0.2, variance=0.0056)
         """
         mean = more_than("mean", mean, 0.0)
         variance = more_than("variance", variance, 0.0)
         # Eq. 17 leaves one quadratic in b: v0 + v1 b - b^2 = ratio (6 - b)^2
-        ratio = variance / mean / mean  # the square of a mean may be no float
-        v0, v1 = 36 * math.pi - 108, 20 - 6 * math.pi
+        ratio = variance / mean / mean  # the square of a mean may underflow
+        v0 = 36 * math.pi - 108
+        v1 = 20 - 6 * math.pi
         roots = np.roots([-1 - ratio, v1 + 12 * ratio, v0 - 36 * ratio] if ratio < 1 else [])
         for root in sorted(roots[np.abs(roots.imag) < 1e-12].real):
             b = float(np.clip(root, -1.0, 2.0))
@@ -106,7 +115,8 @@ class Orientation:
 
         Raises ValueError for angles that are not finite.
         """
-        th, ph = finite("theta", theta, "rad"), finite("phi", phi, "rad")
+        th = finite("theta", theta, "rad")
+        ph = finite("phi", phi, "rad")
         # a sin(a theta)/sin(theta) -> a^2 as theta -> 0, by the ratio of two sinc functions
         ratio = self.a**2 * np.sinc(self.a * th / np.pi) / np.sinc(th / np.pi)
         shape = 1 + self.b / 4 * (3 * np.cos(2 * self.a * th) + 1)

@@ -1,7 +1,7 @@
 """Laws as TOML files, with the same keys as the constructors.
 
-A table holds what differs from its default. Where there are several kinds, its key `kind` names
-one; without it the first is meant.
+A table has the parameters that differ from their defaults. If there are several kinds, its key
+`kind` names one; the default is the first kind.
 """
 
 from collections.abc import Mapping
@@ -10,17 +10,17 @@ from typing import Any
 
 from ..support.checks import one_of
 from .declared import parameters_of
-from .keys import checked, keys_of
+from .keys import keys_of, validate_table
 
-VERSION = 1  # of the keys; a file without one is of version 1
-FREE = ("version", "about")  # about: a free table for title, source and notes
+VERSION = 1  # of the keys; a file without a version is of version 1
+OTHER_KEYS = ("version", "about")  # about: a free table for title, source and notes
 Kinds = Mapping[str, Any]
 
 
 def law_text(law: Any, kinds: Kinds, shown: Mapping[str, Any]) -> str:
-    """TOML text of a law of one of these kinds; `shown` replaces values.
+    """TOML text of a law of one of these kinds; `shown` replaces values of attributes.
 
-    Raises ValueError for what no file can name: a class of the user's own.
+    Raises ValueError for a class without a name in files.
     """
     lines = [f"version = {VERSION}  # of this file's keys", *_lines(law, kinds, "law", shown)]
     return "\n".join(lines) + "\n"
@@ -38,7 +38,7 @@ def text_or_reason(law: Any) -> tuple[str, str]:
 
 
 def _lines(values: Any, kinds: Kinds, path: str, shown: Mapping[str, Any]) -> list[str]:
-    """Lines of a table, those of tables within it last."""
+    """Lines of a table; tables inside it come last."""
     names = [name for name, kind in kinds.items() if type(values) is kind]
     if not names:
         raise ValueError(
@@ -48,15 +48,16 @@ def _lines(values: Any, kinds: Kinds, path: str, shown: Mapping[str, Any]) -> li
         )
     lines = [f'kind = "{names[0]}"'] if names[0] != next(iter(kinds)) else []
     inner: list[str] = []
-    defaults = {one.name: one.default for one in fields(values)}
-    for name, said in parameters_of(values).items():
+    defaults = {item.name: item.default for item in fields(values)}
+    for name, declaration in parameters_of(values).items():
         value = shown.get(name, getattr(values, name))
         if value is None or value == defaults[name]:
             continue
         if is_dataclass(value):
-            inner += ["", f"[{name}]", *_lines(value, kinds_of(said.kind), name, {})]
+            inner += ["", f"[{name}]", *_lines(value, kinds_of(declaration.kind), name, {})]
         else:
-            lines.append(f"{name} = {_text(value)}" + (f"  # {said.unit}" if said.unit else ""))
+            unit = f"  # {declaration.unit}" if declaration.unit else ""
+            lines.append(f"{name} = {_text(value)}{unit}")
     return [*lines, *inner]
 
 
@@ -70,19 +71,22 @@ def _text(value: Any) -> str:
 
 
 def kinds_of(kind: Any) -> Kinds:
-    """The kinds that a parameter may be of, by the names that files have."""
+    """Classes that the value of a parameter may have, by their names in files."""
     return kind if isinstance(kind, Mapping) else {"": kind}
 
 
 def law_of(kinds: Kinds, data: Mapping[str, Any], where: str) -> Any:
-    """A law of one of these kinds from the mapping of a file; `where` is named in errors."""
+    """A law of one of these kinds from the mapping of a file; `where` names it in errors.
+
+    Raises ValueError naming the key.
+    """
     version = data.get("version", VERSION)
     if version != VERSION:
         raise ValueError(
             f"{where}: key 'version' = {version!r}: this jointlaw reads version {VERSION}; write "
             "the law again with this version, or install the one that wrote it"
         )
-    keys = {key: value for key, value in data.items() if key not in FREE}
+    keys = {key: value for key, value in data.items() if key not in OTHER_KEYS}
     try:
         return build(kinds, keys, where, "")
     except ValueError as error:
@@ -91,7 +95,7 @@ def law_of(kinds: Kinds, data: Mapping[str, Any], where: str) -> Any:
 
 
 def build(kinds: Kinds, data: Any, where: str, path: str) -> Any:
-    """An object of one of these kinds from its table, and those within it from theirs."""
+    """An object of one of these kinds from its table, with the objects inside it."""
     first = next(iter(kinds))
     table = dict(data) if isinstance(data, Mapping) else data
     name = first
@@ -99,10 +103,11 @@ def build(kinds: Kinds, data: Any, where: str, path: str) -> Any:
         key = f"{where}: {path}.kind" if path else f"{where}: kind"
         name = one_of(key, table.pop("kind", first), tuple(kinds))
     kind = kinds[name]
-    values = checked(table, keys_of(kind), where, path)
-    for key, said in parameters_of(kind).items():
-        inner, value = kinds_of(said.kind), values.get(key)
-        tables = is_dataclass(next(iter(inner.values())))
-        if tables and value is not None and not isinstance(value, str):
+    values = validate_table(table, keys_of(kind), where, path)
+    for key, declaration in parameters_of(kind).items():
+        inner = kinds_of(declaration.kind)
+        value = values.get(key)
+        is_table = is_dataclass(next(iter(inner.values())))
+        if is_table and value is not None and not isinstance(value, str):
             values[key] = build(inner, value, where, f"{path}.{key}" if path else key)
     return kind(**values)

@@ -9,7 +9,7 @@ import numpy as np
 from ..joints.batch import JointBatch
 from ..joints.normal_control import NormalCondition, closing_increments
 from ..laws.joint_law import JointLaw
-from ..parameters.resolution import SLIP
+from ..parameters.resolution import SHEAR_RESOLUTION
 from ..parameters.toml import text_or_reason
 from ..support.checks import Array, integer, more_than
 from ..support.version import __version__
@@ -55,7 +55,7 @@ def tabulate(
     limit = SHEAR_LIMIT_RATIO * law.closure_range
     if isinstance(law, JointLaw):
         law = replace(law, bond=None)
-        finer = replace(law, resolution=SLIP)
+        finer = replace(law, resolution=SHEAR_RESOLUTION)
         limit = law.mating_length if math.isfinite(law.mating_length) else limit
     end = more_than("closure", law.closure_range if closure is None else closure, 0.0)
     tolerance = more_than("tolerance", tolerance, 0.0)

@@ -104,16 +104,16 @@ def test_both_forms_of_the_tables_give_what_python_gives(lib, tmp_path, i):
             assert lib.jlaw_closure(one.law, stress) == pytest.approx(law.closure(stress), 1e-12)
         assert lib.jlaw_fingerprint(one.law).decode() == law.fingerprint
         assert np.isnan([lib.jlaw_closure(one.law, bad) for bad in (np.nan, -1.0, np.inf)]).all()
-        assert np.isnan(lib.jlaw_normal_stress(one.law, 2 * law.largest_reach))
+        assert np.isnan(lib.jlaw_normal_stress(one.law, 2 * law.max_effective_closure))
         apart = law.joint()
         with contextlib.suppress(ValueError):  # of a law whose faces always fit
             apart = law.joint(mated=False)
         assert lib.jlaw_init_unmated(one.law, at(one.state)) == (0 if apart.delta.any() else -1)
         np.testing.assert_array_equal(one.state, apart.snapshot().values[0])
         assert lib.jlaw_tensile_opening(one.law) == law.tensile_opening
-        assert lib.jlaw_has_damage(one.law) == ("damage" in law.tables.names)
+        assert lib.jlaw_has_damage(one.law) == law.tables.breaks
         intact, broken = law.joints(1), law.joints(1)
-        broken.unbond([0])
+        broken.break_bond([0])
         one.state[:] = intact.snapshot().values[0]
         lib.jlaw_break_bond(one.law, at(one.state))
         np.testing.assert_array_equal(one.state, broken.snapshot().values[0])
@@ -188,7 +188,7 @@ def test_axes_turned_between_azimuths(lib, tmp_path, damage):
     errors = []
     for phi in (4, 8, 16):
         law = isotropic(phi, damage=damage)
-        joint, end = CLaw(lib, law, tmp_path), 4 + law.tables.names["q"]
+        joint, end = CLaw(lib, law, tmp_path), 4 + law.tables.row_counts["q"]
         for _ in range(5):
             F, _ = joint.step([1e-7, 5e-8, 2e-8])
         stored, before = in_sliders(joint, end), joint.state.copy()

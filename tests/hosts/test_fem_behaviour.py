@@ -91,7 +91,7 @@ def test_a_point_is_the_law_in_python(finite_elements, tmp_path, name):
         T, K = point.step((SIGN * d)[:n])
         F, C = joint.update(d[: law.dim])
         found.append((SIGN[:n] * T, signs * K, [*point.energies]))
-        energies = [joint.measures().stored, joint.dissipated_energy]
+        energies = [joint.measures().stored_energy, joint.dissipated_energy]
         expected.append((F[:n], C[:n, :n], energies))
     for i, share in enumerate((1e-12, 1e-8, 1e-12)):
         mine, theirs = (np.array([step[i] for step in steps]) for steps in (found, expected))

@@ -45,9 +45,9 @@ def test_any_array_is_accepted_and_left_alone(law, form):
 
 
 def test_energies_that_are_not_added_up(law):
-    batch = law.joints(2, ledger=False)
+    batch = law.joints(2, track_dissipation=False)
     assert not hasattr(batch, "dissipated_energy")
-    with pytest.raises(AttributeError, match=r"plastic_work is not .* ledger=True"):
+    with pytest.raises(AttributeError, match=r"plastic_work is not .* track_dissipation=True"):
         _ = batch.plastic_work
 
 

@@ -75,7 +75,10 @@ def test_no_eigenvalue_exceeds_the_first_loading_stiffness(name, reduction):
         highest = np.maximum(highest, batch.delta[:, 0])
         largest = np.abs(np.linalg.eigvals(scale[:, None] * C * scale)).max(axis=1)
         # a sheared joint may be closed less at a stress, so the bound is that of closure and shear
-        closed = highest + np.linalg.norm(batch.delta[:, 1:], axis=1) * law.tables.stretch
+        closed = (
+            highest
+            + np.linalg.norm(batch.delta[:, 1:], axis=1) * law.tables.closure_per_displacement
+        )
         assert (largest <= law.first_loading_stiffness(closed, reduction) * (1 + 1e-9)).all()
 
 

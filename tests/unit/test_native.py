@@ -10,7 +10,7 @@ from c_host import random_law, random_path
 
 import jointlaw as jl
 from jointlaw.kernels import engine, reference
-from jointlaw.kernels.threads import share_out
+from jointlaw.kernels.threads import run_on_threads
 from jointlaw.native import build, library
 
 # Either kernel sums a few hundred terms per facet in its own order and carries q over the path: a
@@ -20,7 +20,7 @@ SAME, SAME_C = 1e-12, 1e-10  # q of a slider carries three times as much
 # MIN_CHORD_STEP^-2 = 1e10, in the few facets that a step hardly opens or closes; most joints agree
 # far better.
 WORST_C, USUAL_C = 2e-6, 1e-12
-N = 17 * engine.LANES + 3  # blocks of joints and part of another
+N = 17 * engine.JOINTS_PER_BLOCK + 3  # blocks of joints and part of another
 
 
 @pytest.fixture(autouse=True)
@@ -75,10 +75,10 @@ def given_by(batch, seed):
     return [*tractions, batch.F], [*tangents, batch.snapshot().values, *batch.measures()]
 
 
-@pytest.mark.parametrize(("seed", "ledger"), [(9, True), (10, False)])
-def test_same_numbers_while_contacts_come_and_go(both, seed, ledger):
+@pytest.mark.parametrize(("seed", "track_dissipation"), [(9, True), (10, False)])
+def test_same_numbers_while_contacts_come_and_go(both, seed, track_dissipation):
     law = random_law(seed)
-    slow, fast = (given_by(one, seed)[0] for one in both(lambda: law.joints(N, ledger)))
+    slow, fast = (given_by(one, seed)[0] for one in both(lambda: law.joints(N, track_dissipation)))
     peak = max(np.abs(F).max() for F in slow if F.size)
     for one, other in zip(slow, fast, strict=True):
         assert worst(one, other, peak) < SAME
@@ -106,7 +106,7 @@ def test_the_tangent_exactly_at_the_friction_limit_is_that_of_sliding_on(both, m
 
 def test_threads_change_no_bit(monkeypatch):
     law = random_law(10)
-    monkeypatch.setattr(engine, "SERIAL", 0)
+    monkeypatch.setattr(engine, "MIN_SLIDERS_FOR_THREADS", 0)
     monkeypatch.setenv("JOINTLAW_THREADS", "1")
     alone = given_by(law.joints(N), 10)
     for threads in ("2", "5"):
@@ -124,7 +124,7 @@ def test_what_fails_on_another_thread_is_raised_after_all_have_ended():
 
     for _ in range(2):  # the thread that failed works on
         with pytest.raises(MemoryError, match="no memory"):
-            share_out(work, 2)
+            run_on_threads(work, 2)
     assert ended == [True, True]
 
 
@@ -136,7 +136,7 @@ def test_what_fails_on_another_thread_is_raised_after_all_have_ended():
     ],
 )
 def test_bad_settings_are_named(law, monkeypatch, name, value, message):
-    monkeypatch.setattr(engine, "SERIAL", 0)
+    monkeypatch.setattr(engine, "MIN_SLIDERS_FOR_THREADS", 0)
     monkeypatch.setenv(name, value)
     with pytest.raises(ValueError, match=f"{name} = '{value}'.*{message}"):
         law.joints(N).update(np.zeros((N, 3)))
@@ -167,7 +167,7 @@ def test_a_step_shows_what_the_state_then_amounts_to(both, seed):
     for batch in both(lambda: law.joints(N)):
         for increments in d:
             shown = np.empty((N, 6 + dim))
-            batch.take(engine.Step(increments, np.empty((N, dim)), None, shown=shown))
+            batch.advance(engine.Step(increments, np.empty((N, dim)), None, measures=shown))
             measures = *batch.measures()[:4], batch.dissipated_energy, batch.damage
             np.testing.assert_array_equal(shown, np.column_stack([*measures, batch.delta]))
 
@@ -187,7 +187,7 @@ def follows_the_reference(law, way):
         other = reference.measures(k, state)
         pairs = [
             (F[:, 0], F_alone), (C[..., 0], C_alone), (state[dim + 1 :, 0], mine[dim + 1 :]),
-            ([other.stored[0], state[dim, 0]], [one.stored, mine[dim]]),
+            ([other.stored_energy[0], state[dim, 0]], [one.stored_energy, mine[dim]]),
         ]  # fmt: skip
         off = np.maximum(off, [np.abs(np.subtract(a, b)).max() for a, b in pairs])
         peak = np.maximum(peak, [np.abs(a).max() for a, _ in pairs])

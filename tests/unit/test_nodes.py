@@ -14,8 +14,8 @@ from jointlaw.accuracy.slip import STEPS_PER_LEG, max_slip, run_slip_tests
 from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tradeoff import _time_update
 from jointlaw.discretisation.facets import facets
-from jointlaw.discretisation.nodes import azimuths, depth_nodes, inclinations
-from jointlaw.discretisation.virgin_curve import virgin_curve
+from jointlaw.discretisation.first_loading_curve import first_loading_curve
+from jointlaw.discretisation.nodes import azimuths, cell_limits, inclinations
 
 
 @pytest.mark.parametrize("b", [-1.0, 0.5, 2.0])
@@ -49,14 +49,14 @@ def test_azimuths_are_exact_for_the_harmonics_of_c(phi, flattest):
 
 def test_cells_for_small_loads_are_a_geometric_grading():
     """sqrt(Phi''/Phi) ~ 1/y from the lowest closure on: relative errors of all loads are equal."""
-    curve = virgin_curve(0.5, None)
+    curve = first_loading_curve(0.5, None)
     lowest = 1e-2
-    (nodes,) = depth_nodes(curve, 2.0, np.zeros(1), np.array([30]), lowest)
+    (nodes,) = cell_limits(curve, 2.0, np.zeros(1), np.array([30]), lowest)
     inner = nodes[nodes > 2.0 * lowest][:-1]
     ratio = inner[1:] / inner[:-1]
     assert len(inner) > 15
     assert np.ptp(ratio) < 0.01 * ratio[0]  # summed over panels
-    usual = depth_nodes(curve, 2.0, np.zeros(1), np.array([30]))
+    usual = cell_limits(curve, 2.0, np.zeros(1), np.array([30]))
     assert np.count_nonzero(nodes < 0.1) > 2 * np.count_nonzero(usual < 0.1)
 
 

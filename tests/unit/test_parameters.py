@@ -13,7 +13,13 @@ from hypothesis import strategies as st
 
 import jointlaw as jl
 from jointlaw.calibration.priors import PRIORS, TRANSFORMS
-from jointlaw.parameters.resolution import NAMED, NAMED_FLAT, NAMED_LATE, NAMED_SHORT, named
+from jointlaw.parameters.resolution import (
+    NAMED_RESOLUTIONS,
+    RESOLUTIONS_LONG,
+    RESOLUTIONS_SHORT,
+    RESOLUTIONS_YIELDING,
+    named_resolutions,
+)
 
 LAWS = kinds.LAWS | {
     "thirds": kinds.make_law(
@@ -23,7 +29,7 @@ LAWS = kinds.LAWS | {
     "brittle bond": kinds.make_law(bond=jl.Bond(1e10, 1 / 3e-10, 0.0, 1e6)),
     "own resolution": kinds.make_law(resolution=jl.Resolution(3, 5, 7)),
     "cells for small loads": kinds.make_law(resolution=jl.Resolution(3, 5, 7, lowest=0.02)),
-    "named resolution": kinds.make_law(resolution="fine"),
+    "named_resolutions resolution": kinds.make_law(resolution="fine"),
     "default range": kinds.make_law(closure_range=None),
 }
 
@@ -94,14 +100,20 @@ def test_equal_laws_have_one_fingerprint(make_law):
 @pytest.mark.parametrize("name", ["fast", "balanced", "fine", "reference"])
 def test_the_mating_length_chooses_the_nodes(make_law, name):
     """Its own depth cells and facets; a file holds the name, not the nodes."""
-    for ratio, chosen in ((2.4, named(2.4)), (2.6, named()), (101.0, named(101.0))):
+    for ratio, chosen in (
+        (2.4, named_resolutions(2.4)),
+        (2.6, named_resolutions()),
+        (101.0, named_resolutions(101.0)),
+    ):
         law = make_law(resolution=name, closure_range=1e-6, mating_length=ratio * 1e-6)
         assert law.resolution == chosen[name]
         assert len(law.facets.theta) == len(law.tables.asperities.c1)
         assert (f'resolution = "{name}"' in law.to_toml()) == (name != "balanced")
         assert jl.JointLaw.from_text(law.to_toml()) == law
-    assert (named(2.4)[name] != named()[name]) == (name in ("fast", "balanced"))
-    assert (named(101.0)[name] != named()[name]) == (name == "fine")
+    assert (named_resolutions(2.4)[name] != named_resolutions()[name]) == (
+        name in ("fast", "balanced")
+    )
+    assert (named_resolutions(101.0)[name] != named_resolutions()[name]) == (name == "fine")
 
 
 def test_the_default_closure_range_is_the_same_for_every_resolution(make_law):
@@ -125,7 +137,7 @@ def test_linear_asperities_have_the_stiffness_given(make_law):
 
 def test_lists_of_names_that_belong_together():
     """What replaces a resolution has its name; a prior is of what a fit can find."""
-    assert {*NAMED_SHORT, *NAMED_LATE, *NAMED_FLAT} <= set(NAMED)
+    assert {*RESOLUTIONS_SHORT, *RESOLUTIONS_LONG, *RESOLUTIONS_YIELDING} <= set(NAMED_RESOLUTIONS)
     assert set(PRIORS) <= set(TRANSFORMS)
 
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import jointlaw as jl
-from jointlaw.parameters.keys import checked
+from jointlaw.parameters.keys import validate_table
 from jointlaw.support.checks import number
 
 GOOD = kinds.make_law(bond=jl.Bond(2e9, 1e9, 1e6, 3e6, 300.0, 5000.0))
@@ -96,14 +96,14 @@ UNIFORM = [1], [0.0, 1e-5]
 MASKED = np.ma.masked_array([1e-7, 0.0, 0.0], [False, True, False])
 NO_FINITE_CLOSURE = r"1e\+12 Pa is beyond any closure"
 NOT_BOOLEANS = r"mated = .* must be True or False, or an array"
-BEYOND = "joint 1: .* leads beyond largest_reach"
+BEYOND = "joint 1: .* leads beyond max_effective_closure"
 NOT_A_RANGE = "give the smallest and the largest normal stress"
 
 
 def closed_states(law, fraction):
-    """States of two joints, the second closed to this fraction of `largest_reach`."""
+    """States of two joints, the second closed to this fraction of `max_effective_closure`."""
     states = np.zeros((2, law.state_size))
-    states[:, 0] = 1e-7, fraction * law.largest_reach
+    states[:, 0] = 1e-7, fraction * law.max_effective_closure
     return states
 
 
@@ -199,9 +199,9 @@ def test_an_invalid_argument_of_a_call(law, call, message):
     ],
 )
 def test_closures_whose_forces_overflow(law, call):
-    """Beyond `largest_reach` a force would overflow, so the closure is refused."""
-    call(law, 0.3 * law.largest_reach)
-    for value in (10.0 * law.largest_reach, 1e300):
+    """Beyond `max_effective_closure` a force would overflow, so the closure is refused."""
+    call(law, 0.3 * law.max_effective_closure)
+    for value in (10.0 * law.max_effective_closure, 1e300):
         with pytest.raises(ValueError, match=r"(closure|delta) = .* is out of bounds.*overflow"):
             call(law, value)
 
@@ -291,7 +291,7 @@ RULES = {"end!": number, "drive": [{"block!": number}]}
 
 def test_rules_for_lists_of_tables():
     data = {"end": 2, "drive": [{"block": 1}]}
-    assert checked(data, RULES, "f") == {"end": 2.0, "drive": [{"block": 1.0}]}
+    assert validate_table(data, RULES, "f") == {"end": 2.0, "drive": [{"block": 1.0}]}
     for message, change in {
         "f: key 'run.drive[1].block' is missing": {"drive": [{"block": 1}, {}]},
         "f: key 'run.drive' must be a list": {"drive": 3},
@@ -299,4 +299,4 @@ def test_rules_for_lists_of_tables():
         "run.end = 'x' is not a number": {"end": "x"},
     }.items():
         with pytest.raises(ValueError, match=re.escape(message)):
-            checked(data | change, RULES, "f", "run")
+            validate_table(data | change, RULES, "f", "run")

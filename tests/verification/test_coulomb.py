@@ -16,7 +16,7 @@ from work import work_of_step
 
 import jointlaw as jl
 from jointlaw.kernels import reference
-from jointlaw.kernels.bond import Bonded
+from jointlaw.kernels.bond import BondElement
 
 KN = 1e10  # Pa/m
 KS = 4e9  # Pa/m
@@ -93,7 +93,7 @@ def test_separated_and_unmated_faces_have_no_cohesion():
     for softening in ({}, {"residual_cohesion": 0.5 * COHESION, "weakening": 1e-3}):
         law = coulomb(**softening)
         joints = law.joints(4, mated=[True, True, True, False])
-        joints.unbond([1])
+        joints.break_bond([1])
         joints.update([[-1e-3, 0.0], *3 * [[0.0, 0.0]]])
         joints.update([[1e-3 + 1e-4, 0.0], *3 * [[1e-4, 0.0]]])
         F, _ = joints.update([[0.0, 1e-2]] * 4)
@@ -194,7 +194,7 @@ def test_energy_of_closed_cycles(seed, dim):
         scale = stiffness * size**2 + element.cohesion * size
         F, dissipation, tangent = element.step(delta, d, state, new, True)
         assert (dissipation >= 0.0).all()
-        gained = element.stored(delta + d, new) - element.stored(delta, state)
+        gained = element.stored_energy(delta + d, new) - element.stored_energy(delta, state)
         work = work_of_step(element, delta, d, state, 1e-14 * scale)
         assert (work >= gained - 1e-10 * scale).all()
         if dim == 2:
@@ -212,7 +212,7 @@ def test_energy_of_closed_cycles(seed, dim):
         np.testing.assert_array_equal(zero_step.lost, 0.0 * dissipation)
         state = new
         total_work = total_work + work
-    assert (total_work >= element.stored(corners[-1], state) - 1e-9 * scale).all()
+    assert (total_work >= element.stored_energy(corners[-1], state) - 1e-9 * scale).all()
     assert largest_ratio > 0.999  # the bound is reached
     assert (state[-1] > 0.0).mean() > 0.5
     assert (total_work > 0.1 * element.cohesion**2 / element.shear).any()
@@ -291,7 +291,7 @@ def fracture_energies(bond):
 def damage_and_dissipation(bond, delta, old):
     """Damage and dissipation (B,) of a bond of the old damage after a step to delta (3, B)."""
     new = np.empty((1, len(old)))
-    step = Bonded(bond).step(np.zeros_like(delta), delta, old[None], new, False)
+    step = BondElement(bond).step(np.zeros_like(delta), delta, old[None], new, False)
     return new[0], step.lost
 
 
@@ -367,19 +367,19 @@ def test_closed_cycles_of_a_bond_create_no_energy(seed):
     size = 10.0 ** rng.uniform(-2.0, 2.0, 2000) / bond.limits[1].min()  # of the broken bond
     corners = rng.normal(size=(5, 3, 2000)) * size
     corners[0] = corners[-1] = 0.0
-    element = Bonded(bond)
+    element = BondElement(bond)
     intact = np.zeros((1, 2000))
     damage = intact
     work = 0.0
     scale = 0.0
     for start, end in pairwise(corners):
         new = damage.copy()
-        scale = np.maximum(scale, element.stored(end, intact))
+        scale = np.maximum(scale, element.stored_energy(end, intact))
         assert (element.step(start, end - start, damage, new, False).lost >= 0.0).all()
         assert (new >= damage).all()  # no healing
         work = work + work_of_step(element, start, end - start, damage, 1e-14 * scale)
         damage = new
-        assert (work >= element.stored(end, damage) - 1e-10 * scale).all()
+        assert (work >= element.stored_energy(end, damage) - 1e-10 * scale).all()
     assert (damage > 0.0).mean() > 0.5
 
 

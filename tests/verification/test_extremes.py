@@ -150,7 +150,7 @@ CLOSE_TO_OVERFLOW = [
 @pytest.mark.parametrize("changes", CLOSE_TO_OVERFLOW, ids=name)
 def test_parameters_close_to_overflow_satisfy_all_invariants(changes):
     law = build(**changes)
-    assert not run(law, min(SCALE, 1e-6 * law.largest_reach), 1, n=6, steps=12)
+    assert not run(law, min(SCALE, 1e-6 * law.max_effective_closure), 1, n=6, steps=12)
 
 
 @pytest.mark.parametrize("changes", LAWS, ids=name)
@@ -166,10 +166,10 @@ def test_force_is_lipschitz(changes, record):
         e = rng.normal(size=(n, 3)) * size
         before = joints.snapshot()
         G = joints.update(d + e, tangent=False)[0]
-        closure = joints.measures().reach
+        closure = joints.measures().max_effective_closure
         joints.restore(before)
         F = joints.update(d, tangent=False)[0]
-        closure = np.maximum(closure, joints.measures().reach)
+        closure = np.maximum(closure, joints.measures().max_effective_closure)
         # F is a sum over all facets: its rounding error is proportional to stiffness times closure
         bound = law.max_stiffness(closure) * (
             np.linalg.norm(e, axis=1) + 1e-14 * (np.abs(closure) + np.linalg.norm(d, axis=1))

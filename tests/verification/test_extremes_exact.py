@@ -11,7 +11,7 @@ import pytest
 from extremes.laws import COMPILED, FULL, SCALE, build, name
 
 import jointlaw as jl
-from jointlaw.discretisation.virgin_curve import exact_force, virgin_curve
+from jointlaw.discretisation.first_loading_curve import exact_force, first_loading_curve
 
 DIGITS = 50
 CASES = [
@@ -35,7 +35,7 @@ class ExactJoint:
         k = law.tables.asperities
         self.m = exact(k.m.T)
         self.n = exact(k.n.T)
-        self.depth = exact(k.depth)
+        self.depth = exact(k.cell_depth)
         self.basis = exact(np.stack([k.s.T, k.t.T], axis=1))
         self.area = exact(k.area)
         self.c1 = exact(k.c1)
@@ -126,7 +126,7 @@ def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
     to 1e-10 of the largest S / w^p.
     """
     heights = jl.GammaHeights(alpha, 1.15, 0.0, "individual")
-    curve = virgin_curve(eta, heights)
+    curve = first_loading_curve(eta, heights)
     p = mp.mpf(alpha) + 1
     q = mp.mpf(eta) + 1
     rise = mp.gamma(q + 1) / mp.gamma(p + q + 1)
@@ -197,8 +197,8 @@ class Masses:
             if k % ENERGY_INTERVAL == 0:
                 measures = joints.measures()
                 kinetic = 0.5 * MASS * np.sum(v * v_next, axis=1)
-                energy = kinetic + AREA * measures.stored - joints.delta @ load
-                samples.append((energy, measures.reach))
+                energy = kinetic + AREA * measures.stored_energy - joints.delta @ load
+                samples.append((energy, measures.max_effective_closure))
             v = v_next
             F = joints.update(v * dt, tangent=False)[0]
         energies, closure = np.array(samples).swapaxes(0, 1)

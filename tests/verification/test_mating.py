@@ -125,7 +125,7 @@ def test_shear_without_friction_and_closing_do_not_degrade_asperities(mu, path):
     for d in path:
         joint.update(d)
     assert max(joint.F[1], joint.dissipated_energy) > 1e-3  # it climbs, or friction dissipates
-    assert joint.slopes == 1.0
+    assert joint.slope_retention == 1.0
 
 
 def test_asperities_degrade_by_the_work_of_shear():
@@ -135,14 +135,16 @@ def test_asperities_degrade_by_the_work_of_shear():
     joint = one.joint()
     joint.update([0.6, 0.0])
     for _ in range(80):
-        before = kernel.parts(one.tables, joint.snapshot().values.T).work[0]
+        before = kernel.state_parts(one.tables, joint.snapshot().values.T).shear_work[0]
         joint.update([0.0, 0.05])
-        assert joint.slopes == pytest.approx(0.25 + 0.75 * np.exp(-before / 0.2), rel=1e-12)
-    now = kernel.parts(one.tables, joint.snapshot().values.T)
-    y = effective_closure(one.tables.asperities, now.delta, now.slopes)[:, 0]
+        assert joint.slope_retention == pytest.approx(
+            0.25 + 0.75 * np.exp(-before / 0.2), rel=1e-12
+        )
+    now = kernel.state_parts(one.tables, joint.snapshot().values.T)
+    y = effective_closure(one.tables.asperities, now.delta, now.slope_retention)[:, 0]
     climbed = 4.0 / np.hypot(1.0, 4.0 / 3.0)
-    expected = 0.6 + joint.slopes * climbed * one.tables.asperities.m[1]
-    assert joint.slopes < 0.9
+    expected = 0.6 + joint.slope_retention * climbed * one.tables.asperities.m[1]
+    assert joint.slope_retention < 0.9
     np.testing.assert_allclose(y, expected, rtol=1e-12)
 
 
@@ -174,14 +176,14 @@ def random_joint(rng, fades, wears, yields=True):
         plane=[None, None, 0.7][rng.integers(3)], **more,
     )  # fmt: skip
     state = np.zeros((one.tables.rows, 1))
-    if one.tables.fades and rng.random() < 1 / 3:
+    if one.tables.interlock_decays and rng.random() < 1 / 3:
         state[: one.dim, 0] = one.unmated_start
     return one, state
 
 
 def stored(k, states):
     """Stored energies (n,) in J/m2."""
-    return kernel.measures(k, states).stored
+    return kernel.measures(k, states).stored_energy
 
 
 def energy_scale(k, states):
@@ -189,9 +191,9 @@ def energy_scale(k, states):
 
     The stored energy is a small difference of such energies, and has their rounding.
     """
-    state = kernel.parts(k, states)
+    state = kernel.state_parts(k, states)
     facets = k.asperities
-    y = effective_closure(facets, state.delta, state.slopes)
+    y = effective_closure(facets, state.delta, state.slope_retention)
     elastic = (facets.area * facets.c1) @ facets.curve.energy(y)
     return max(np.max(elastic), stored(k, states).max())
 
@@ -226,7 +228,7 @@ def test_no_step_of_a_random_path_creates_energy(seed, fades, wears, yields):
     states = states_along(k, state, d)
     gains, rounding = energy_gains(k, states, d)
     assert gains.max() <= rounding
-    dissipation = np.diff(kernel.parts(k, states).dissipated)
+    dissipation = np.diff(kernel.state_parts(k, states).dissipated_energy)
     assert dissipation.min() >= -1e-12 * energy_scale(k, states)
 
 

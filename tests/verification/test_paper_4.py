@@ -130,7 +130,7 @@ def test_no_displacement_no_force(eta):
     [
         (0.5, [1.0, 0.0], "exact", "delta"),
         (0.5, [1.0, math.nan, 0.0], "exact", "delta"),
-        (0.5, [1e200, 0.0, 0.0], "exact", "largest_reach"),
+        (0.5, [1e200, 0.0, 0.0], "exact", "max_effective_closure"),
         (0.5, [1.0, 0.0, 0.0], "mindlin", "contact"),
         (1.5, [1.0, 0.0, 0.0], "series", r"asperity\.eta"),
     ],

@@ -287,7 +287,7 @@ def test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate(eta, depth, 
     counts = (1, 10, 100, 1000, 10_000)
     # flat faces that hardly slip
     one = build(resolution=jl.Resolution(1, 3, depth), a=1e6, mu=10.0, eta=eta)
-    nodes = one.tables.asperities.depth[0]
+    nodes = one.tables.asperities.cell_depth[0]
     zeta = nodes[nodes < SCALE * (1.0 - amplitude)].max() / SCALE
     c = zeta**eta if zeta > 0.0 else 0.0
     part = 1.0 - c if eta > 0.0 else 0.0  # at eta = 0 one spring has the whole force, and keeps it

@@ -145,7 +145,7 @@ def test_facets_and_cells_of_balanced_follow_from_the_page(mating):
     np.testing.assert_allclose(k.theta, theta, rtol=1e-12)
     np.testing.assert_allclose(law.facets.phi, phi, rtol=1e-12)
     np.testing.assert_allclose(k.weight, weight, rtol=1e-12)
-    for expected, depth in zip(depths, k.depth, strict=True):
+    for expected, depth in zip(depths, k.cell_depth, strict=True):
         np.testing.assert_allclose(depth[1 : len(expected)], expected[1:], rtol=1e-12)
         assert depth[len(expected)] > 1e290  # no more cells
     assert k.sliders == sum(map(len, depths))

@@ -11,7 +11,7 @@ from c_host import random_law
 
 import jointlaw as jl
 from jointlaw.kernels.asperities import effective_closure
-from jointlaw.kernels.stiffness import stiffness_of
+from jointlaw.kernels.stiffness import stiffness_bound
 
 STEPS = np.geomspace(3e-3, 3e-7, 30)  # in closure ranges
 
@@ -207,7 +207,7 @@ def test_a_short_mating_length_is_bounded():
         size = np.linalg.norm(joints.update(d)[1], 2, axis=(1, 2))
         assert (size <= joints.max_stiffness()).all()
         y = effective_closure(law.tables.asperities, joints.delta.T, np.ones(60))
-        ratio = np.max(size / stiffness_of(constant_slopes, y))
+        ratio = np.max(size / stiffness_bound(constant_slopes, y))
         largest_ratio = max(largest_ratio, ratio)
     assert largest_ratio > 1.5
 

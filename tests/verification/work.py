@@ -4,9 +4,10 @@ import numpy as np
 
 from jointlaw.kernels import asperities
 from jointlaw.kernels import reference as kernel
-from jointlaw.kernels.mating import planes
-from jointlaw.kernels.wear import worn_share
-from jointlaw.kernels.yielding import flatten
+from jointlaw.kernels.cells import evaluate_cells
+from jointlaw.kernels.degradation import degrade_slopes
+from jointlaw.kernels.interlock import planes
+from jointlaw.kernels.plasticity import subtract_plastic, update_indentation
 
 # Lobatto's rule of four points on 0 to 1, which has points at both ends of each part
 _NODES = [0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0]
@@ -64,12 +65,12 @@ def degraded(k, state):
     """States (rows, B) at the start of a step: after degradation by the work of friction so far."""
     new_state = state.copy()
     facets = k.asperities
-    if facets.wears:
-        old = kernel.parts(k, state)
-        new = kernel.parts(k, new_state)
-        new.worn[:] = worn_share(facets, old.worn, old.work)
-        new.q[:], dissipation = asperities.wear(facets, old.delta, old, 1 - new.worn)
-        new.dissipated[:] += dissipation
+    if facets.degrades:
+        old = kernel.state_parts(k, state)
+        new = kernel.state_parts(k, new_state)
+        new.lost_slopes[:] = degrade_slopes(facets, old.lost_slopes, old.shear_work)
+        new.q[:], dissipation = asperities.degrade(facets, old.delta, old, 1 - new.lost_slopes)
+        new.dissipated_energy[:] += dissipation
     return new_state
 
 
@@ -87,32 +88,36 @@ def work_on_step_geometry(k, states, d, exact):
     The planes are constant in a step, and y varies linearly: docs/theory-incremental.md,
     "Dissipation is non-negative along the geometry of the step".
     """
-    old = kernel.parts(k, states)
+    old = kernel.state_parts(k, states)
     facets = k.asperities
-    slopes = old.slopes
+    slopes = old.slope_retention
     p0 = old.delta[1:]
     p1 = p0 + d[1:]
     middle = planes(facets, 0.5 * (p0 + p1), slopes)
     gamma = np.maximum(planes(facets, p0, slopes).gamma, planes(facets, p1, slopes).gamma)
     y0 = asperities.effective_closure(facets, old.delta, slopes)
     y1 = asperities.effective_closure(facets, old.delta + d, slopes)
-    limit = asperities.strength(facets, np.broadcast_to(gamma, y0.shape))
+    limit = asperities.friction_limit(facets, np.broadcast_to(gamma, y0.shape))
     in_plane = np.einsum("edmb,db->emb", middle.basis, d)
 
     def power(j, t):
         y = y0[:, j] + t * (y1 - y0)[:, j]
-        before = asperities.cells(facets, y0[:, j])
-        after = asperities.cells(facets, y)
+        before = evaluate_cells(facets, y0[:, j])
+        after = evaluate_cells(facets, y)
         gained = after.G - before.G
         if facets.yields:
-            old_indentation = asperities.cells(facets, old.depth[:, j])
+            old_indentation = evaluate_cells(facets, old.indentation[:, j])
             gained = after.G - np.maximum(before.G, old_indentation.G)
-            indentation = asperities.cells(facets, flatten(facets, old.depth[:, j], y))
-            before = asperities.flattened(before, old_indentation)
-            after = asperities.flattened(after, indentation)
+            indentation = evaluate_cells(
+                facets, update_indentation(facets, old.indentation[:, j], y)
+            )
+            before = subtract_plastic(before, old_indentation)
+            after = subtract_plastic(after, indentation)
         slip = (t * in_plane[..., j])[:, :, None]
-        sliders = asperities.load(facets, before, gained, after, limit[..., j], old.q[..., j], slip)
-        q = sliders.share * sliders.trial
+        sliders = asperities.load_sliders(
+            facets, before, gained, after, limit[..., j], old.q[..., j], slip
+        )
+        q = sliders.scale * sliders.trial
         normal_force = (facets.area * facets.c1)[:, None] * after.force
         normal_power = np.sum(normal_force * (y1 - y0)[:, j], axis=0)
         return normal_power + np.einsum("emb,emdb->b", in_plane[..., j], q) / facets.lam

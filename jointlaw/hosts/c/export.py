@@ -4,7 +4,7 @@ import math
 import re
 from pathlib import Path
 
-from ...kernels.pack import pack, rings
+from ...kernels.pack import pack, ring_sizes
 from ...laws.law import Law
 from ...native.layout import MAX_AZIMUTHS, TABLE_FORMAT, jointlaw_h
 from ...parameters.toml import text_or_reason
@@ -126,7 +126,7 @@ def _parameters_as_comment(law: Law) -> list[str]:
 def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` by name, in its order; refuses too many azimuths."""
     facets = law.tables.asperities
-    if facets is not None and (most := rings(facets.theta).max()) > MAX_AZIMUTHS:
+    if facets is not None and (most := ring_sizes(facets.theta).max()) > MAX_AZIMUTHS:
         raise ValueError(
             f"resolution.phi gives {most:g} azimuths on the circle: jointlaw.h takes at most "
             f"{MAX_AZIMUTHS}; lower it"

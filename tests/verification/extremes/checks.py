@@ -5,7 +5,9 @@ import numpy as np
 from jointlaw.kernels import asperities
 from jointlaw.kernels import reference as kernel
 from jointlaw.kernels.asperities import effective_closure
-from jointlaw.kernels.mating import offset, planes
+from jointlaw.kernels.cells import evaluate_cells
+from jointlaw.kernels.interlock import offset, planes
+from jointlaw.kernels.plasticity import subtract_plastic
 
 ROUNDING = 1e-12  # of the facet's normal force: G of a cell is a difference of such forces
 # Of the largest traction: the rounding of y, 1e-16, over the smallest step with a chord, 1e-5 y
@@ -16,11 +18,13 @@ MIN_TRACTION = 1e-60  # Pa; forces of sliders far below count as zero, as their 
 def sliders_within_friction(batch):
     """Largest excess of |f_s| over mu f_n of any slider, over mu f_n of its elastic facet."""
     k = batch.law.tables.asperities
-    now = kernel.parts(batch.law.tables, batch.snapshot().values.T)
-    y = effective_closure(k, now.delta, now.slopes)
-    virgin = asperities.cells(k, y)
-    cells = asperities.flattened(virgin, asperities.cells(k, now.depth) if k.yields else None)
-    strength = asperities.strength(k, planes(k, now.delta[1:], now.slopes).gamma)[:, 0]
+    now = kernel.state_parts(batch.law.tables, batch.snapshot().values.T)
+    y = effective_closure(k, now.delta, now.slope_retention)
+    elastic = evaluate_cells(k, y)
+    cells = subtract_plastic(elastic, evaluate_cells(k, now.indentation) if k.yields else None)
+    strength = asperities.friction_limit(k, planes(k, now.delta[1:], now.slope_retention).gamma)[
+        :, 0
+    ]
     size = np.hypot(now.q[0], now.q[1])
     excess = size - strength[:, None] * cells.G
     # the terms of a facet's y may cancel to rounding, where shear is normal to its azimuth
@@ -28,7 +32,7 @@ def sliders_within_friction(batch):
     max_y = np.abs(k.m).T @ np.abs(terms)
     scale = strength * k.curve.force(max_y)[0]
     scale = np.where(scale > 0, scale, np.inf)[:, None]
-    touches = y + ROUNDING * max_y > (now.depth if k.yields else 0)
+    touches = y + ROUNDING * max_y > (now.indentation if k.yields else 0)
     lifted = np.where(~touches[:, None] & (size > 0), np.inf, 0.0)
     return float(np.max(np.maximum(excess / scale, lifted), initial=0.0))
 
@@ -68,8 +72,8 @@ def run(law, size, seed, n=8, steps=32):
         peak_force = np.maximum(peak_force, np.abs(F).max(axis=1))
         if law.tables.yields:  # forces are small differences of the forces of elastic facets
             facets = law.tables.asperities
-            now = kernel.parts(law.tables, joints.snapshot().values.T)
-            force, _ = facets.curve.force(effective_closure(facets, now.delta, now.slopes))
+            now = kernel.state_parts(law.tables, joints.snapshot().values.T)
+            force, _ = facets.curve.force(effective_closure(facets, now.delta, now.slope_retention))
             peak_force = np.maximum(peak_force, (1.0 + facets.mu) * (facets.area @ force))
         excess = sliders_within_friction(joints)
         _, F_numpy, _ = kernel.step(law.tables, before.T, d.T, False)

@@ -89,13 +89,13 @@ class LiveLaw:
     Memory belongs to a contact as long as YADE keeps it, so `Law2...(neverErase=True)` is needed:
     a sheared joint dilates and carries stress at negative closure. A new contact counts the shear
     made in touch only. The memory turns with body id1. `law` is a law of jointlaw, or the path of
-    its file. `ledger` adds up the energy that friction takes, for
+    its file. `track_dissipation` sums the dissipated energy, for
     `batch.dissipated_energy`, at some cost; `pool.places` tell the joints of the contacts there.
     """
 
     mode = "live"
 
-    def __init__(self, law, ledger=False):
+    def __init__(self, law, track_dissipation=False):
         from jointlaw import JointLaw, JointPool  # table mode does without
 
         law = law if hasattr(law, "dim") else JointLaw.from_toml(law)
@@ -103,7 +103,7 @@ class LiveLaw:
             raise ValueError(
                 "contacts in YADE shear in 3-D: set law.plane=None, closure_only=False"
             )
-        self.law, self.pool = law, JointPool(law, ledger)
+        self.law, self.pool = law, JointPool(law, track_dissipation)
         self.find()
 
     def stiffness(self, closure=None):
@@ -121,7 +121,7 @@ class LiveLaw:
         """
         new = self.pool.add([object() for _ in closure])  # keys; contacts are told by their order
         if not bonded:
-            self.batch.unbond(new)
+            self.batch.break_bond(new)
         self.batch.update(np.outer(closure, [1.0, 0.0, 0.0]), where=new, tangent=False)
         self.find()
 

@@ -58,7 +58,9 @@ def test_a_joint_shows_what_a_batch_does(law):
     F[:], C[:], joint.delta[:], joint.F[:] = 0.0, 0.0, 0.0, 0.0  # the caller's own
     np.testing.assert_array_equal(joint.snapshot().values, before)
     assert (law.dim, batch.law.state_size) == (3, batch.snapshot().values.shape[1])
-    assert jl.Joint.delta.__doc__.startswith("Displacement from the mated position (dim,): closure")
+    assert jl.Joint.delta.__doc__.startswith(
+        "Displacement from the interlocked position (dim,): closure"
+    )
 
 
 def test_each_contact_has_the_history_of_a_joint_of_its_own(any_law):

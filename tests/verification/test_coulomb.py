@@ -209,7 +209,7 @@ def test_energy_of_closed_cycles(seed, dim):
         zero_step = element.step(delta + d, 0.0 * d, new, repeated, False)
         np.testing.assert_array_equal(repeated, new)
         np.testing.assert_array_equal(zero_step.F, F)
-        np.testing.assert_array_equal(zero_step.lost, 0.0 * dissipation)
+        np.testing.assert_array_equal(zero_step.dissipated, 0.0 * dissipation)
         state = new
         total_work = total_work + work
     assert (total_work >= element.stored_energy(corners[-1], state) - 1e-9 * scale).all()
@@ -292,7 +292,7 @@ def damage_and_dissipation(bond, delta, old):
     """Damage and dissipation (B,) of a bond of the old damage after a step to delta (3, B)."""
     new = np.empty((1, len(old)))
     step = BondElement(bond).step(np.zeros_like(delta), delta, old[None], new, False)
-    return new[0], step.lost
+    return new[0], step.dissipated
 
 
 @pytest.mark.parametrize("direction", MODES)
@@ -375,7 +375,7 @@ def test_closed_cycles_of_a_bond_create_no_energy(seed):
     for start, end in pairwise(corners):
         new = damage.copy()
         scale = np.maximum(scale, element.stored_energy(end, intact))
-        assert (element.step(start, end - start, damage, new, False).lost >= 0.0).all()
+        assert (element.step(start, end - start, damage, new, False).dissipated >= 0.0).all()
         assert (new >= damage).all()  # no healing
         work = work + work_of_step(element, start, end - start, damage, 1e-14 * scale)
         damage = new

@@ -54,7 +54,7 @@ def test_an_error_of_a_law_in_python_passes_through_the_compiled_iterations(monk
         raise ZeroDivisionError("in the law")
 
     for batch, _, _ in relaxing.steps:
-        monkeypatch.setattr(batch, "take", fail)
+        monkeypatch.setattr(batch, "advance", fail)
     with pytest.raises(ZeroDivisionError, match="in the law"):
         relaxing.unbalanced(search.expand(search.zero))
 

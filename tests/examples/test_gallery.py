@@ -143,7 +143,7 @@ LAW = "incremental law (this package)"
 KNOWN_POINTS = {
     8: ("(a) Kₛ/Kₙ = 0.5", "b = −1", 0, 0.7 / 0.6),
     9: ("", "c = 1/3", 45, 0.9),
-    10: ("share that slides, Kₛ = Kₙ", "a = 2, total", 12, np.cos(2 * np.arctan(0.6))),
+    10: ("sliding fraction, Kₛ = Kₙ", "a = 2, total", 12, np.cos(2 * np.arctan(0.6))),
     14: (TOTAL, "a = 3", -1, 0.9356),
     15: (TOTAL, "linear, a = 6", -1, 0.6939),
     17: (LAW, "rough", -1, 0.661),

@@ -21,21 +21,27 @@ from jointlaw.cli.main import EXIT_INTERRUPTED, EXIT_INVALID_INPUT, Parser
 from jointlaw.support.files import SUMMARY, write_json
 from jointlaw.support.pyplot import FORMATS
 
+from .dynamics.relaxation import MAX_ITERATIONS, Verdict
 from .dynamics.simulation import Simulation
 from .output.folder import ABLATION, STRENGTH, TRIALS, require_free
 from .output.monitors import friction_angle
 from .output.pictures import Pictures
 from .output.record import RunRecord, format_blocks, format_outcome, list_blocks, report_lines
 from .output.run import run, steps_to
-from .scene import TEMPLATE, SceneError, load, shipped
+from .scene import TEMPLATE, Scene, SceneError, load, shipped
 from .studies import ablate, compare, strength
+from .studies.limit_analysis import format_bound, limit_factor
 
-STRENGTH_VERSION = 4
+STRENGTH_VERSION = 5
 FAILURE_RUN_TIME = 3.0  # s: longest run to failure of a strength reduction
 TRIAL_STEPS = 100  # most steps, and
 TRIAL_TIME = 1.0  # s, by which the time of a run is estimated
 MOBILISED_FRICTION = 0.9  # fraction of peak friction that should be mobilised when a bond breaks
 LOW_STRESS = 0.1  # of the stress at the closure range: below it tractions are inaccurate
+BOUND_OF = {  # keys of a row of strength reduction
+    "factor_of_safety": "limit_analysis",
+    "factor_without_excluded": "limit_without_excluded",
+}
 ABOUT = """\
 Rigid rock blocks in 2-D. Every contact force comes from a rock-joint law.
 
@@ -164,11 +170,34 @@ def _describe(sim: Simulation, until: float | None = None, with_pictures: bool =
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, {fixed} fixed")
         for message in rock.messages:
             print(f"  {message}")
-    if sim.unstable.any() and scene.run.settle and not sim.time:
-        count = int(sim.unstable.sum())
-        blocks = f"{count} block has" if count == 1 else f"{count} blocks have"
-        print(f"{blocks} no static equilibrium and will move from the first step: "
-              f"{format_blocks(list_blocks(scene, sim.unstable))}")  # fmt: skip
+    if sim.verdict and not sim.time:
+        _print_verdict(sim)
+
+
+def _print_verdict(sim: Simulation) -> None:
+    """Print the verdict on the initial equilibrium, with the unstable blocks."""
+    print(f"initial state: {sim.verdict}")
+    if not sim.unstable.any():
+        return
+    count = int(sim.unstable.sum())
+    blocks = format_blocks(list_blocks(sim.scene, sim.unstable))
+    if sim.verdict == Verdict.NOT_DECIDED.value:
+        number = "1 block" if count == 1 else f"{count} blocks"
+        print(
+            f"the search found no equilibrium of {number}, and no steady motion that excludes one "
+            f"within {MAX_ITERATIONS} iterations: {blocks}"
+        )
+    else:
+        number = "1 block has" if count == 1 else f"{count} blocks have"
+        print(f"{number} no static equilibrium and will move from the first step: {blocks}")
+
+
+def _print_limit_analysis(scene: Scene) -> None:
+    """Print the upper bound of the factor of safety of a scene that settles."""
+    try:
+        print(f"factor of safety: {format_bound(limit_factor(scene))}")
+    except RuntimeError as error:  # the solver decides nothing
+        print(f"no bound of the factor of safety: {error}")
 
 
 def _print_estimate(sim: Simulation, steps: int, until: float | None, with_pictures: bool) -> None:
@@ -217,6 +246,8 @@ def _check(options: argparse.Namespace) -> None:
     """Validate a scene, and warn of laws that do not suit the stresses of their joints."""
     sim = Simulation(load(options.scene))
     _describe(sim)
+    if sim.verdict:
+        _print_limit_analysis(sim.scene)
     for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows_by_law, strict=True):
         stress = float(sim.joints.traction[rows, 0].max(initial=0.0))
         if isinstance(law, JointLaw):
@@ -313,11 +344,13 @@ def _format_strength(row: dict[str, Any]) -> str:
         "factor_without_excluded": ("factor of safety without unstable blocks", ""),
         "critical_tilt": ("critical tilt", " degrees"),
     }
-    return ", ".join(
-        f"no {name}" if row[key] is None else f"{name} {row[key]:.3g}{unit}"
-        for key, (name, unit) in names.items()
-        if key in row
-    )
+    parts = []
+    for key, (name, unit) in names.items():
+        if key in row:
+            text = f"no {name}" if row[key] is None else f"{name} {row[key]:.3g}{unit}"
+            bound = BOUND_OF.get(key)
+            parts.append(f"{text} ({format_bound(row[bound])})" if bound else text)
+    return ", ".join(parts)
 
 
 SCENE = option("scene", help="a scene of the package by name, or a TOML file")

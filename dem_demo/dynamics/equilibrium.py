@@ -439,13 +439,15 @@ def _displacement_at_stress(joints: Joints, stress: np.ndarray) -> np.ndarray:
 
 def settle(
     scene: Scene, blocks: Blocks, manager: ContactManager, joints: Joints, sliding: np.ndarray
-) -> np.ndarray:
+) -> tuple[np.ndarray, Verdict]:
     """Move the blocks to their static equilibrium.
 
     sliding (k,) in m: with which the joints start at the places as drawn. Returns the sliding with
-    which they start at equilibrium. Unstable blocks stay almost where they are drawn; the
-    others are in equilibrium with the forces that the unstable ones exert on them there.
+    which they start at equilibrium, and the verdict. Unstable blocks stay almost where they
+    are drawn; the others are in equilibrium with the forces that the unstable ones exert on them
+    there.
     """
+    verdict = Verdict.EQUILIBRIUM
     unstable = np.zeros(len(blocks.is_free), bool)
     first_displacement = 0.0
     pairs = blocks.neighbour_pairs()
@@ -459,7 +461,11 @@ def settle(
         search = EquilibriumSearch(scene, blocks, manager, joints, sliding, n_round > 0)
         is_near = n_round or scene.in_situ is not None
         guess = search.zero if is_near else search.stick_predictor()
-        displacement, unstable, _ = search.solve(guess, unstable)
+        displacement, unstable, round_verdict = search.solve(guess, unstable)
+        if round_verdict is Verdict.NOT_DECIDED:
+            verdict = Verdict.NOT_DECIDED
+        elif verdict is Verdict.EQUILIBRIUM and unstable.any():
+            verdict = Verdict.NO_EQUILIBRIUM
         sliding = sliding + (search.kinematics @ displacement)[len(sliding) :]
         blocks.motion[:3] += search.expand(displacement * search.root).T
         is_stable = ~unstable[search.block]
@@ -468,7 +474,7 @@ def settle(
         if n_round and largest <= SETTLED_RATIO * first_displacement:
             break
     manager.rebuilt_at[:] = blocks.motion[:3]
-    return sliding
+    return sliding, verdict
 
 
 def equilibrium_displacements(

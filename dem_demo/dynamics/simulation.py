@@ -28,6 +28,7 @@ from ..scene import Files, Scene, SceneError, parse
 from .blocks import MAX_SKIN_PER_STEP, Blocks, apply_loads
 from .energy_balance import DROPPED, EnergyBalance
 from .equilibrium import create_joints, find_unbalanced, settle
+from .relaxation import Verdict
 from .timestep import MAX_FRACTION_OF_LIMIT, TimeStepLimit, impact_limit
 
 WIDE_MARGIN = 0.4  # fraction of the limit: a step below it stays stable as lever arms change
@@ -45,7 +46,7 @@ FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
 IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
 MAX_HALVINGS = 8  # of a time step that was chosen automatically
 FILE = "state.npz"
-VERSION = 10
+VERSION = 11
 UPDATED_IN_PLACE = (  # arrays of the state that the compiled step, or views of them, refer to
     "blocks.motion",
     "blocks.velocity",
@@ -76,6 +77,7 @@ STATE = (
     "energy_balance.area",
     "energy_balance.booked_dissipation",
     "unstable",
+    "verdict",
     "initial",
 )
 CONTACT_ROWS = "contacts.corner", "contacts.edge"  # from which the contacts are made
@@ -89,7 +91,8 @@ class Simulation:
 
     blocks, manager (of contacts), joints, energy_balance: the parts of the simulation; limit: of
     the time step `dt` (s), which is chosen for the reason `fraction_reason`. unstable (blocks,):
-    blocks without static equilibrium at step 0; initial (6, blocks): motion at step 0;
+    blocks without static equilibrium at step 0; verdict: value of the `Verdict` on the equilibrium
+    at step 0, empty where the scene does not settle; initial (6, blocks): motion at step 0;
     stage_start_times (stages,): when the stages of the excavation began (s), infinite before.
 
     Where neither `step` nor the scene sets the time step, it is halved when joints close too far
@@ -283,12 +286,18 @@ class Simulation:
         manager = self.manager
         joints = self.joints
         sliding = create_joints(scene, blocks, manager, joints)
+        verdict = Verdict.NO_EQUILIBRIUM  # of blocks that touch nothing
         if scene.run.settle and joints.n and blocks.is_free.any():
-            sliding = settle(scene, blocks, manager, joints, sliding)
+            sliding, verdict = settle(scene, blocks, manager, joints, sliding)
         manager.update(blocks.motion)
         self.initial = blocks.motion.copy()
         joints.update(manager.closure, sliding)
         self.unstable = find_unbalanced(scene, blocks, self.contacts, joints)
+        if not self.unstable.any():
+            verdict = Verdict.EQUILIBRIUM
+        elif verdict is Verdict.EQUILIBRIUM:  # a search that ended before forces balance
+            verdict = Verdict.NOT_DECIDED
+        self.verdict = verdict.value if scene.run.settle else ""
         self.limit.update(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._choose_time_step()
         self.limit.require_stable(self.dt)

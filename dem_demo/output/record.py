@@ -28,7 +28,8 @@ class RunRecord:
 
     slips: entries of monitored slips; joint_laws: laws of monitored joints; last_state: state of
     the last frame; steps: of the run until then; unstable (n,): blocks without static equilibrium
-    at step 0; initial (6, n): motion at step 0, also of a run that is resumed.
+    at step 0; verdict: on the equilibrium at step 0, see `Simulation`; initial (6, n): motion at
+    step 0, also of a run that is resumed.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -36,6 +37,7 @@ class RunRecord:
         self.slips = start_slip_monitors(sim)
         self.steps = 0
         self.unstable = sim.unstable
+        self.verdict = sim.verdict
         self.initial = sim.initial
         pairs = (*sim.scene.slip, *sim.scene.shear)
         self.joint_laws = {pair: law_between(sim, *pair) for pair in pairs}

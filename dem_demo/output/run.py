@@ -22,7 +22,7 @@ from .record import RunRecord, list_blocks, outcomes
 
 MAX_STEPS = 1e8  # of a run: days for a hundred blocks
 SLIP_CHECK_INTERVAL = 8  # steps
-SUMMARY_VERSION = 3
+SUMMARY_VERSION = 4
 
 
 def run(
@@ -82,6 +82,7 @@ def summarise(sim: Simulation, record: RunRecord, stopped: BaseException | None 
         "time_step_limit_s": sim.limit.lowest,
         "time_step_margin": sim.limit.lowest / sim.dt,
         "started_in_equilibrium": not record.unstable.any(),
+        "equilibrium": record.verdict or None,
         "unstable": list_blocks(sim.scene, record.unstable),
         "contact_points": sim.joints.n,
         "joint_stresses": "effective" if sim.scene.wet else "total",

@@ -202,6 +202,22 @@ def _further_lines(balance, first, factor, area, slope, tension, cohesive):
     return vstack(rows).tocsr(), np.concatenate(limits)
 
 
+def format_bound(bound: float | None) -> str:
+    """Format an upper bound of the factor of safety for the terminal.
+
+    At a bound of 1 or less the scene itself has no equilibrium.
+    """
+    if bound is None:
+        return "limit analysis gives no bound"
+    if bound > 1.0:
+        return f"at most {bound:.3g} by limit analysis"
+    if bound == 0.0:
+        bound_text = f"also with {LARGEST_FACTOR:g} times the strength"
+    else:
+        bound_text = f"at most {bound:.3g} by limit analysis"
+    return f"no equilibrium exists: proved ({bound_text})"
+
+
 def limit_factor(scene: Scene, excluded: np.ndarray | None = None) -> float | None:
     """Upper bound of the factor of safety of a scene, to 0.1 %.
 

@@ -97,8 +97,10 @@ def strength_reduction(
     Yields rows. `rock`: its name. `unstable`: names and centroids (m) of blocks without static
     equilibrium. `excluded`: the same blocks, or if all blocks are unstable, only blocks that are
     unstable with twice the strength too. `factor_of_safety`: of all blocks.
-    `factor_without_excluded`: of all other blocks, while the excluded ones move away, if some are
-    excluded. `critical_tilt` (degrees). A number is None where none is found. `picture`: name of
+    `limit_analysis`: its upper bound, 0.0 if the scene has no equilibrium with 64 times its
+    strength either, None if it has no bound. `factor_without_excluded`, `limit_without_excluded`:
+    of all other blocks, while the excluded ones move away, if some are excluded. `critical_tilt`
+    (degrees). A number is None where none is found. `picture`: name of
     the picture of the run to failure, None without a factor; the strength of that run is divided by
     1.02 times the factor. `initiating_blocks`: blocks that move first in it, names and centroids
     (m).
@@ -132,9 +134,13 @@ def _reduce_rock(
     is_excluded = np.isin([block.name for block in scene.blocks], names)
     tell(f"{name}: factor of safety of all blocks")
     factor = row["factor_of_safety"] = factor_of_safety(scene, trials, name)
+    row["limit_analysis"] = limit_bound(scene, trials, name)
     if 0 < len(excluded) < count:
         tell(f"{name}: factor of safety without {len(excluded)} unstable blocks")
         factor = row["factor_without_excluded"] = factor_of_safety(
+            scene, trials, f"{name} without unstable blocks", is_excluded
+        )
+        row["limit_without_excluded"] = limit_bound(
             scene, trials, f"{name} without unstable blocks", is_excluded
         )
     else:
@@ -199,7 +205,7 @@ def factor_of_safety(
     with 64 times of it.
     """
     trials = trials or Trials(scene)
-    bound = trials.result(f"{name}: limit analysis", partial(limit_factor, scene, is_excluded))
+    bound = limit_bound(scene, trials, name, is_excluded)
     if bound == 0.0:
         return None
 
@@ -212,6 +218,16 @@ def factor_of_safety(
         else:
             log_factor = search.below(float(np.log(bound)), LOG_FACTOR)
     return None if log_factor is None else float(np.exp(log_factor))
+
+
+def limit_bound(
+    scene: Scene, trials: Trials, name: str, is_excluded: np.ndarray | None = None
+) -> float | None:
+    """Upper bound of the factor of safety by limit analysis (`limit_factor`), computed once.
+
+    trials: finished trials, under `name`. is_excluded (n,): blocks that need no equilibrium.
+    """
+    return trials.result(f"{name}: limit analysis", partial(limit_factor, scene, is_excluded))
 
 
 def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene") -> float | None:

@@ -1,6 +1,7 @@
 """The command line of the block demo: help, examples, JSON on the standard output, messages."""
 
 import json
+import math
 import re
 import shlex
 
@@ -10,6 +11,7 @@ from scene_text import PLAIN, block, on_base
 import jointlaw as jl
 from dem_demo import cli
 from dem_demo.cli import COMMANDS, main
+from dem_demo.dynamics import relaxation
 from dem_demo.scene import shipped
 
 SLAB = on_base(PLAIN, [1.0, 0.3], 10.0, end=0.01)
@@ -65,7 +67,8 @@ def test_json_is_all_that_is_on_the_standard_output(tmp_path, capsys):
     printed = capsys.readouterr()
     (row,) = json.loads(printed.out)["rows"]
     assert row["factor_of_safety"] == pytest.approx(1.7, rel=0.01)  # 0.3 / tan(10 degrees)
-    assert "scene: factor of safety 1.7" in printed.err
+    assert row["limit_analysis"] == pytest.approx(1.7014, rel=1.5e-3)  # the bisection leaves 1e-3
+    assert "scene: factor of safety 1.7 (at most 1.7 by limit analysis)" in printed.err
 
 
 def test_the_estimate_counts_figures_and_animation(tmp_path, capsys):
@@ -124,3 +127,73 @@ def test_all_blocks_stable_at_twice_the_strength_are_reported_in_one_plain_line(
     lines = capsys.readouterr().out.splitlines()
     assert "scene: 1 of 1 blocks are unstable: block (0.00, 0.15)" in lines
     assert "scene: 0 blocks stay unstable at strength x 2" in lines
+
+
+STEEP_BOUND = 0.3 / math.tan(math.radians(20.0))  # 0.8242, the bisection adds up to 1e-3 of it
+PROOF = "no equilibrium exists: proved (at most 0.825 by limit analysis)"
+
+
+def lines_of(capsys, *words):
+    assert main([*words]) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+def test_check_and_summary_say_whether_the_scene_starts_in_equilibrium(
+    tmp_path, capsys, monkeypatch
+):
+    """A slab at 10 degrees holds with a friction of 0.3, at 20 degrees it slides: tan(20) = 0.364.
+
+    A search without iterations decides neither where Newton's method has no solution.
+    """
+    steep = on_base(PLAIN, [1.0, 0.3], 20.0, end=0.01)
+    (tmp_path / "stable.toml").write_text(SLAB)
+    (tmp_path / "steep.toml").write_text(steep)
+    (tmp_path / "drawn.toml").write_text(steep + "settle = false\n")
+    printed = lines_of(capsys, "check", "stable.toml")
+    assert "initial state: in equilibrium" in printed
+    assert "factor of safety: at most 1.7 by limit analysis" in printed  # 0.3 / tan(10 degrees)
+    printed = lines_of(capsys, "check", "steep.toml")
+    assert "initial state: without equilibrium" in printed
+    assert f"factor of safety: {PROOF}" in printed
+    printed = "\n".join(lines_of(capsys, "check", "drawn.toml"))
+    assert "initial state" not in printed
+    assert "limit analysis" not in printed
+    verdicts = {}
+    for name in ("stable", "steep", "drawn"):
+        lines_of(capsys, f"{name}.toml", "--out", name, "--no-pictures")
+        verdicts[name] = json.loads((tmp_path / name / "summary.json").read_text())["equilibrium"]
+    assert verdicts == {
+        "stable": "in equilibrium",
+        "steep": "without equilibrium",
+        "drawn": None,
+    }
+    words = ["resume", "steep", "--until", "0.02", "--no-pictures", "--out", "more"]
+    printed = lines_of(capsys, *words)
+    assert not any(line.startswith("initial state") for line in printed)
+    summary = json.loads((tmp_path / "more" / "summary.json").read_text())
+    assert summary["equilibrium"] == "without equilibrium"
+    monkeypatch.setattr(relaxation, "MAX_ITERATIONS", 2000)
+    printed = lines_of(capsys, "steep.toml", "--out", "short", "--no-pictures")
+    assert "initial state: not decided" in printed
+    assert any("and no steady motion that excludes one" in line for line in printed)
+    summary = json.loads((tmp_path / "short" / "summary.json").read_text())
+    assert summary["equilibrium"] == "not decided"
+    assert [block["block"] for block in summary["unstable"]] == ["block"]
+
+
+def test_strength_reduction_reports_the_proof_of_limit_analysis(tmp_path, capsys):
+    """A slab that is too steep, and a second one in the air: it has no equilibrium at any
+    strength, and without it the bound is the ratio 0.3 / tan(20 degrees) again."""
+    falling = block("falling", box=[0.5, 0.5], at=[0.0, 5.0])
+    steep = on_base(PLAIN, [1.0, 0.3], 20.0, end=0.01).replace("[run]", falling + "[run]")
+    (tmp_path / "steep.toml").write_text(steep)
+    words = ["strength-reduction", "steep.toml", "--until", "0.01", "--out", "out"]
+    printed = lines_of(capsys, *words)
+    (row,) = json.loads((tmp_path / "out" / "strength.json").read_text())["rows"]
+    assert row["limit_analysis"] == 0.0
+    assert row["factor_of_safety"] is None
+    assert row["limit_without_excluded"] == pytest.approx(STEEP_BOUND, rel=1.5e-3)
+    assert row["factor_without_excluded"] <= row["limit_without_excluded"]
+    (line,) = [line for line in printed if line.startswith("scene: no factor of safety")]
+    assert "no equilibrium exists: proved (also with 64 times the strength)" in line
+    assert PROOF in line

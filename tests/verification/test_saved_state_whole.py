@@ -158,7 +158,7 @@ def entries():
     sim = Simulation(parse(IMPACT))
     tables = sim.joints.by_law[0].law.tables
     yield from sim.state()
-    yield from (f"states-0: {name}" for name in tables.names)
+    yield from (f"states-0: {name}" for name in tables.row_counts)
 
 
 def left_out(name, sim):
@@ -173,11 +173,11 @@ def left_out(name, sim):
     value = saved[key]
     if row:
         tables = sim.joints.by_law[0].law.tables
-        if row not in tables.names:
+        if row not in tables.row_counts:
             return None
-        first = tables.first[row]
+        first = tables.first_rows[row]
         value = value.copy()
-        value[first : first + tables.names[row]] = 0.0
+        value[first : first + tables.row_counts[row]] = 0.0
         return saved | {key: value}, not np.array_equal(value, saved[key])
     start = Simulation(sim.scene).state()[key]
     is_like = start.shape == value.shape and value.dtype.kind in "bif"

@@ -24,7 +24,7 @@ from scene_text import block, coulomb, lines
 from scipy.linalg import eigh
 
 from dem_demo.cli import main
-from dem_demo.output import run as output_run
+from dem_demo.output.run import SUMMARY_VERSION
 
 THICKNESS = 1.5  # m
 DASHPOT = 0.05  # fraction of critical damping, the default of scenes
@@ -133,7 +133,7 @@ class Flight:
             "point 1: y_m": (y, ROUNDING),
             "point 1: vx_m/s": (u, ROUNDING),
             "point 1: vy_m/s": (v, ROUNDING),
-            "point 1: moved_m": (np.hypot(*(place - self.point)), ROUNDING),
+            "point 1: displacement_m": (np.hypot(*(place - self.point)), ROUNDING),
             "base: x_m": (ground_moved[0], ROUNDING),
             "base: y_m": (0.0, ROUNDING),
             "base: vx_m/s": (ground_velocity[0], ROUNDING),
@@ -152,7 +152,7 @@ class Flight:
             "rotation_deg": ([0.0, angle * 180 / np.pi], ROUNDING),
             "speed_m/s": ([ground_velocity[0], np.hypot(*velocity)], ROUNDING),
             "largest_joint_slip_m": zeros(2),
-            "loose_at_start": ([0, 1], 0),
+            "unstable_at_start": ([0, 1], 0),
         }
 
     def cells(self):
@@ -160,10 +160,10 @@ class Flight:
         return {
             "block": ([0, 1], 0),
             "displacement_m": (in_space([[0.0, 0.0], flown - ground_moved]), ROUNDING),
-            "turn_rad": ([0.0, angle], ROUNDING),
+            "rotation_rad": ([0.0, angle], ROUNDING),
             "velocity_m/s": (in_space([ground_velocity, velocity]), ROUNDING),
             "spin_rad/s": ([0.0, self.spin], ROUNDING),
-            "loose": ([0, 1], 0),
+            "unstable": ([0, 1], 0),
         }
 
     def stresses(self):
@@ -190,22 +190,22 @@ class Flight:
         x, y = self.start
         return {
             "steps": 200,
-            "step_limit_s": None,  # without contacts there is no limit
+            "time_step_limit_s": None,  # without contacts there is no limit
             "time_step_margin": None,
             "started_in_equilibrium": False,
-            "loose": [{"block": "flyer", "x_m": x, "y_m": y}],
-            "law_points": 0,
-            "stresses_of_joints": "total",
+            "unstable": [{"block": "flyer", "x_m": x, "y_m": y}],
+            "contact_points": 0,
+            "joint_stresses": "total",
             "slip": [],
             "rocks": [
                 {
                     "rock": "blocks",
-                    "state": "fails",
+                    "state": "displacing",
                     "blocks": 1,
-                    "settled_m": pytest.approx(0.0, abs=ROUNDING),
-                    "moved_m": pytest.approx(moved),
-                    "failed": 1,
-                    "failed_beyond_m": pytest.approx(0.1 * np.sqrt(self.box.prod())),
+                    "settlement_m": pytest.approx(0.0, abs=ROUNDING),
+                    "displacement_m": pytest.approx(moved),
+                    "failed_blocks": 1,
+                    "failure_displacement_m": pytest.approx(0.1 * np.sqrt(self.box.prod())),
                     "creep_m_per_s": pytest.approx(moved / 0.2),  # the run is shorter than 1 s
                 }
             ],
@@ -335,18 +335,18 @@ class Stack:
             "stack 1: normal_Pa": (self.normal / self.width, pa),
             "stack 1: shear_Pa": (self.shear_stress, pa),
             "stack 1: closure_m": (self.closure, ROUNDING),
-            "stack 1: slid_m": (self.slip, ROUNDING),
-            "stack 1: sliding_share": (0.0, 0),
+            "stack 1: slip_m": (self.slip, ROUNDING),
+            "stack 1: sliding_fraction": (0.0, 0),
             "joint 1: normal_Pa": (self.seam_stress, pa),
             "joint 1: shear_Pa": (0.0, pa),
             "joint 1: closure_m": (self.seam_closure, ROUNDING),
-            "joint 1: slid_m": (0.0, ROUNDING),
-            "joint 1: sliding_share": (0.0, 0),
+            "joint 1: slip_m": (0.0, ROUNDING),
+            "joint 1: sliding_fraction": (0.0, 0),
             "point 1: x_m": (x, ROUNDING),
             "point 1: y_m": (y, ROUNDING),
             "point 1: vx_m/s": (0.0, ROUNDING),
             "point 1: vy_m/s": (0.0, ROUNDING),
-            "point 1: moved_m": (np.hypot(*moved), ROUNDING),
+            "point 1: displacement_m": (np.hypot(*moved), ROUNDING),
         }
 
     def blocks(self):
@@ -356,7 +356,7 @@ class Stack:
             "x_m": (x, ROUNDING),
             "y_m": (y, ROUNDING),
             "largest_joint_slip_m": ([self.slip, self.slip, 0.0], ROUNDING),
-            "loose_at_start": zeros(3),
+            "unstable_at_start": zeros(3),
         }
 
     def cells(self):
@@ -364,10 +364,10 @@ class Stack:
         return {
             "block": ([0, 1, 2], 0),
             "displacement_m": vectors,
-            "turn_rad": zeros(3),
+            "rotation_rad": zeros(3),
             "velocity_m/s": vectors,
             "spin_rad/s": zeros(3),
-            "loose": zeros(3),
+            "unstable": zeros(3),
         }
 
     def stresses(self):
@@ -406,7 +406,7 @@ class Stack:
             "slipping": zeros(4),
             "separated": zeros(4),
             "length_m": ([1.0] * 4, ROUNDING),
-            "sliding_m/s": zeros(4),
+            "slip_rate_m/s": zeros(4),
             "state": zeros(4),
         }
 
@@ -419,24 +419,27 @@ class Stack:
         springs += [(corner * max(self.seam), [x, self.low], 0, 1) for x in (0.0, 2.0)]
         limit = critical_step(list(zip(mass, inertia, centroids, strict=True)), springs)
         sizes = np.sqrt(self.width * np.array([self.low, self.high]))
+        settlement = np.hypot(*(self.place_2 - [1.0, 1.25]))
         return {
             "steps": 100,
-            "step_limit_s": pytest.approx(limit, rel=1e-4),
+            "time_step_limit_s": pytest.approx(limit, rel=1e-4),
             "time_step_margin": pytest.approx(limit / self.time_step, rel=1e-4),
             "started_in_equilibrium": True,
-            "loose": [],
-            "law_points": 4,
-            "stresses_of_joints": "effective",
+            "unstable": [],
+            "contact_points": 4,
+            "joint_stresses": "effective",
             "slip": [],
             "rocks": [
                 {
                     "rock": "stack",
-                    "state": "stands",
+                    "state": "stable",
                     "blocks": 2,
-                    "settled_m": pytest.approx(np.hypot(*(self.place_2 - [1.0, 1.25])), rel=1e-4),
-                    "moved_m": pytest.approx(0.0, abs=ROUNDING),
-                    "failed": 0,
-                    "failed_beyond_m": pytest.approx(0.1 * np.sqrt(np.median(sizes**2))),
+                    "settlement_m": pytest.approx(
+                        np.hypot(*(self.place_2 - [1.0, 1.25])), rel=1e-4
+                    ),
+                    "displacement_m": pytest.approx(0.0, abs=ROUNDING),
+                    "failed_blocks": 0,
+                    "failure_displacement_m": pytest.approx(0.1 * np.sqrt(np.median(sizes**2))),
                     "creep_m_per_s": pytest.approx(0.0, abs=ROUNDING),
                 }
             ],
@@ -529,8 +532,8 @@ class Slide:
                 self.stress / self.stiffness,
                 1e-3 * self.stress / self.stiffness,
             ),
-            "slider: slid_m": (slid, self.tolerance),
-            "slider: sliding_share": (sliding, 0),
+            "slider: slip_m": (slid, self.tolerance),
+            "slider: sliding_fraction": (sliding, 0),
         }
 
     def blocks(self):
@@ -544,7 +547,7 @@ class Slide:
             "rotation_deg": ([0.0, 0.0], 1e-5),
             "speed_m/s": ([0.0, velocity], self.velocity_tolerance),
             "largest_joint_slip_m": ([slid, slid], self.tolerance),
-            "loose_at_start": ([0, 1], 0),
+            "unstable_at_start": ([0, 1], 0),
         }
 
     def cells(self):
@@ -552,10 +555,10 @@ class Slide:
         return {
             "block": ([0, 1], 0),
             "displacement_m": (in_space([[0.0, 0.0], [slid, 0.0]]), self.tolerance),
-            "turn_rad": ([0.0, 0.0], 2e-7),
+            "rotation_rad": ([0.0, 0.0], 2e-7),
             "velocity_m/s": (in_space([[0.0, 0.0], [velocity, 0.0]]), self.velocity_tolerance),
             "spin_rad/s": ([0.0, 0.0], self.velocity_tolerance),
-            "loose": ([0, 1], 0),
+            "unstable": ([0, 1], 0),
         }
 
     def stresses(self):
@@ -587,7 +590,7 @@ class Slide:
             "slipping": (ones, 0),
             "separated": zeros(2),
             "length_m": (0.5 * ones, ROUNDING),
-            "sliding_m/s": (velocity * ones, self.velocity_tolerance),
+            "slip_rate_m/s": (velocity * ones, self.velocity_tolerance),
             "state": (2 * ones, 0),
         }
 
@@ -602,12 +605,12 @@ class Slide:
         x, y = self.start
         return {
             "steps": 1000,
-            "step_limit_s": pytest.approx(limit, rel=1e-4),
+            "time_step_limit_s": pytest.approx(limit, rel=1e-4),
             "time_step_margin": pytest.approx(limit / self.time_step, rel=1e-4),
             "started_in_equilibrium": False,
-            "loose": [{"block": "slider", "x_m": pytest.approx(x), "y_m": pytest.approx(y)}],
-            "law_points": 2,
-            "stresses_of_joints": "total",
+            "unstable": [{"block": "slider", "x_m": pytest.approx(x), "y_m": pytest.approx(y)}],
+            "contact_points": 2,
+            "joint_stresses": "total",
             "slip": [
                 {
                     "block": "slider",
@@ -630,12 +633,12 @@ class Slide:
             "rocks": [
                 {
                     "rock": "blocks",
-                    "state": "moves",
+                    "state": "displacing",
                     "blocks": 1,
-                    "settled_m": pytest.approx(0.0, abs=ROUNDING),
-                    "moved_m": pytest.approx(slid, abs=self.tolerance),
-                    "failed": 0,
-                    "failed_beyond_m": pytest.approx(0.1 * np.sqrt(self.box.prod())),
+                    "settlement_m": pytest.approx(0.0, abs=ROUNDING),
+                    "displacement_m": pytest.approx(slid, abs=self.tolerance),
+                    "failed_blocks": 0,
+                    "failure_displacement_m": pytest.approx(0.1 * np.sqrt(self.box.prod())),
                     "creep_m_per_s": pytest.approx(slid / 0.1, abs=self.velocity_tolerance),
                 }
             ],
@@ -768,14 +771,14 @@ def test_every_key_of_summary(written):
     energies = scene.energies(scene.times[-1])
     errors = [scene.energy_error(t) for t in scene.times]
     expected = scene.summary() | {
-        "version": output_run.VERSION,
+        "version": SUMMARY_VERSION,
         "scene": scene.title,
         "model_time_s": pytest.approx(scene.times[-1], abs=1e-12),
         "time_step_s": scene.time_step,
-        "stages_begun_s": [],
+        "stage_start_s": [],
         "energy_J": {k: pytest.approx(v, abs=scene.energy_tolerance) for k, v in energies.items()},
         "energy_error": pytest.approx(errors[-1], abs=1e-6),
-        "largest_energy_error": pytest.approx(max(errors), abs=1e-6),
+        "max_energy_error": pytest.approx(max(errors), abs=1e-6),
         "stopped": None,
         "files": ["history.csv", "blocks.csv"],
     }

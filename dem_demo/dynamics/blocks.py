@@ -24,9 +24,9 @@ class Blocks:
     inertia; inverse_sqrt_inertia (n, 3): of free motions, else 0; inverse_mass (n,) in 1/kg: of
     blocks that forces move, else 0. is_mobile (n, 1): blocks that move, also fixed rock that a
     drive moves; is_free (n, 3): motions that forces move; is_removed (n,): excavated blocks.
-    gravity, steady_loads (n, 3): constant forces (N); loads (n, 3): steady loads, pressures on
-    edges and support (`apply_loads`); support (n, 3): the remaining part of the forces that removed
-    blocks exerted on the others (N).
+    gravity, steady_loads (n, 3): constant forces (N), gravity with the pseudo-static seismic
+    forces; loads (n, 3): steady loads, pressures on edges and support (`apply_loads`); support
+    (n, 3): the remaining part of the forces that removed blocks exerted on the others (N).
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -44,7 +44,7 @@ class Blocks:
         self.is_removed = np.zeros(n, bool)
         self.inverse_sqrt_inertia = np.where(self.is_free, 1 / np.sqrt(self.inertia), 0.0)
         self.inverse_mass = self.is_free[:, :2].any(axis=1) / self.inertia[:, 0]
-        self.gravity = self.is_mobile * self.inertia * [*scene.gravity, 0.0]
+        self.gravity = self.is_mobile * self.inertia * [*scene.acceleration, 0.0]
         self.steady_loads = np.array([[*block.load, 0.0] for block in blocks]) * self.is_mobile
         self.loads = self.steady_loads.copy()
         self.support = np.zeros((n, 3))

@@ -159,12 +159,13 @@ def predict_slip(scene: Scene, law_name: str, moving: int, length: float) -> dic
 
     Returns `predicted_angle` (degrees) of the base and `normal_stress` (Pa) at slip. They are found
     together, because the normal stress falls as the base tilts. Both are None without contact or
-    gravity, with water, and for a stress that the law cannot carry.
+    gravity, with water, with seismic coefficients, and for a stress that the law cannot carry.
     """
     weight = scene.blocks[moving].section.mass * np.hypot(*scene.gravity)
     angle = FIRST_ANGLE
+    is_predicted = length > 0 and not scene.wet and not any(scene.seismic)
     with suppress(ValueError, jl.PathError):
-        for _ in range(MAX_ITERATIONS if length > 0 and not scene.wet else 0):
+        for _ in range(MAX_ITERATIONS if is_predicted else 0):
             previous = angle
             stress = float(weight / length * np.cos(np.radians(angle)))
             angle = friction_angle(scene.laws[law_name], stress)

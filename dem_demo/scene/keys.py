@@ -14,6 +14,7 @@ from shapely import Polygon
 from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
+MAX_SEISMIC_COEFFICIENT = 2.0  # of the weight: no site has been shaken so strongly
 
 
 def of_kind(name: str, value: Any, kind: type) -> Any:
@@ -36,6 +37,15 @@ def vector(name: str, value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
         raise ValueError(f"{name} = {value!r}: must be two numbers [x, y]")
     return number(name, value[0]), number(name, value[1])
+
+
+def seismic_coefficients(name: str, value: Any) -> tuple[float, float]:
+    """Require two shares of the weight."""
+    x, y = vector(name, value)
+    for one in (x, y):
+        within(name, one, -MAX_SEISMIC_COEFFICIENT, MAX_SEISMIC_COEFFICIENT,
+               "(shares of the weight; 15 % is 0.15)")  # fmt: skip
+    return x, y
 
 
 def points(name: str, value: Any) -> list[tuple[float, float]]:
@@ -106,6 +116,7 @@ RUN = {
 }  # fmt: skip
 SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
+    "seismic": seismic_coefficients,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
     "excavate": [{"corners!": corners, "start": NOT_NEGATIVE, "release_time!": POSITIVE}],

@@ -24,7 +24,8 @@ TEMPLATE = Path(__file__).parent / "template.toml"
 WATER_UNIT_WEIGHT = 9810.0  # N/m3
 SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
 DEFAULTS = {  # of the top level; m/s2, kg/m3, m
-    "gravity": (0.0, -9.81), "density": 2600.0, "thickness": 1.0, "monitor": {},
+    "gravity": (0.0, -9.81), "seismic": (0.0, 0.0), "density": 2600.0, "thickness": 1.0,
+    "monitor": {},
     **dict.fromkeys(("block", "rock", "drive", "joint", "excavate"), ()),
 }  # fmt: skip
 CORNER_LENGTH_PER_WIDTH = 0.1  # of the narrowest block
@@ -116,6 +117,11 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         if "pressure" in table
     }
     default = top.setdefault("law", next(iter(laws), ""))
+    if any(top["seismic"]) and not any(top["gravity"]):
+        raise ValueError(
+            f"{where}: seismic = {list(top['seismic'])}: shares of the weight, which is zero "
+            "without gravity; give gravity, or leave seismic out"
+        )
     blocks = [_block(table, top["density"], where) for table in top["block"]]
     edge_laws: dict[tuple[int, int], str] = {}
     rocks = [_rock(table, blocks, edge_laws, top, where) for table in top["rock"]]
@@ -135,8 +141,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
-        edge_laws, drives, top["gravity"], top["thickness"], water, in_situ, pressure,
-        tuple(_stages(top["excavate"], blocks, where)), **monitors,
+        edge_laws, drives, top["gravity"], top["seismic"], top["thickness"], water, in_situ,
+        pressure, tuple(_stages(top["excavate"], blocks, where)), **monitors,
     )  # fmt: skip
     skin = scene.skins.min()
     if INTACT_ROCK in edge_laws.values():

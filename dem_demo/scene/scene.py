@@ -91,6 +91,9 @@ class Scene:
     tables, by one or two blocks. edge_laws: law of each (block, edge) that lies on a joint of a
     rock mass.
 
+    gravity: acceleration (m/s2). seismic: pseudo-static forces along x and y, as shares of the
+    weight of every block; they load blocks only, water and in-situ stress follow from `gravity`.
+
     water: pore pressure in joints and on faces; in_situ: stress before an excavation; pressure:
     water pressure (Pa) in the joints of a law, by its name. stages: excavation stages, each with
     its `blocks`, its `start` (s; None: once the rock is at rest) and its `release_time` (s).
@@ -114,6 +117,7 @@ class Scene:
     edge_laws: dict[tuple[int, int], str] = field(default_factory=dict)
     drives: tuple[Drive, ...] = ()
     gravity: tuple[float, float] = (0.0, -9.81)
+    seismic: tuple[float, float] = (0.0, 0.0)
     thickness: float = 1.0
     water: Stress | None = None
     in_situ: Stress | None = None
@@ -136,6 +140,11 @@ class Scene:
             SKIN_PER_MEDIAN_WIDTH * median_width(self.blocks), MAX_SKIN_PER_WIDTH * widths
         )
         return skin if self.run.skin is None else np.full(len(widths), self.run.skin)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Gravity and pseudo-static acceleration (2,) in m/s2 that load the blocks."""
+        return np.array(self.gravity) + np.hypot(*self.gravity) * np.array(self.seismic)
 
     @property
     def wet(self) -> bool:

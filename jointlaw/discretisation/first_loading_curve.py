@@ -189,9 +189,10 @@ def _hermite(value: Array, slope: Array, is_increasing: bool) -> Array:
         bound = 3 * np.maximum(step, 0.0)
         upper = np.minimum(np.append(bound, np.inf), np.append(np.inf, bound))
         slope = np.clip(slope, 0.0, upper)
-    left = slope[:-1]
-    right = slope[1:]
-    return np.stack([value[:-1], left, 3 * step - 2 * left - right, left + right - 2 * step], -1)
+    slope0 = slope[:-1]
+    slope1 = slope[1:]
+    quadratic = 3 * step - 2 * slope0 - slope1
+    return np.stack([value[:-1], slope0, quadratic, slope0 + slope1 - 2 * step], -1)
 
 
 def _tabulate_energy(eta: float, scale: float, S: Array, exponent: float) -> Array:

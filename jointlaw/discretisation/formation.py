@@ -113,7 +113,7 @@ def _jacobi_rule(p: float) -> tuple[Array, Array]:
 
 
 def _integrate_steps(y: Array, p: float, heights: HeightDistribution, reachable: Array) -> Array:
-    """int_0^y H(r0 + s) (1 - s/y)^p ds for a density that is constant between breakpoints."""
+    """int_0^y H(r0 + s) (1 - s/y)^p ds for a constant density between breakpoints."""
     edges = np.concatenate([[0.0], reachable])
     density = heights.pdf(heights.overlap + 0.5 * (edges[:-1] + edges[1:]))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -115,6 +115,6 @@ def cell_limits(
     last = np.interp(largest_closure, edges, total)[:, None]
     target = last * (limit / (count - 1 + _LAST_CELL_PART))
     inner = np.where(limit < count, np.interp(target, total, edges), UNUSED)
-    begin = np.zeros((len(slope), 1))
+    first = np.zeros((len(slope), 1))
     end = np.full((len(slope), 1), np.inf)
-    return np.concatenate([begin, inner, end], axis=1)
+    return np.concatenate([first, inner, end], axis=1)

@@ -149,7 +149,7 @@ class JointBatch:
         """Return the joints at `index` (all if None) to their initial state.
 
         mated: True for the virgin state, False for faces that have never met, as `JointLaw.joint`.
-        Raises ValueError for a wrong index, or a law that is always mated.
+        Raises ValueError for a wrong index, or a law with permanent interlock.
         """
         start = 0.0 if mated else self.law.tables.unmated_start
         joints = np.arange(self._n) if index is None else self._index(index)
@@ -214,7 +214,7 @@ class JointBatch:
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: in m2; numbers or (n,). Infinite where
         nothing touches. Joints that close or shear further become stiffer: compute it again, or
         keep a margin. Rotation is not included, as in `JointLaw.critical_time_step`. Raises
-        ValueError for other shapes or numbers that are not > 0.
+        ValueError for other shapes or numbers <= 0.
         """
         for name, value in (("mass", mass), ("area", area)):
             shape = np.shape(value)

@@ -85,7 +85,7 @@ class Joint:
         """Return to the initial state.
 
         mated: True for the virgin state, False for faces that have never met. Raises ValueError for
-        a law that is always mated.
+        a law with permanent interlock.
         """
         self._batch.reset(mated=mated)
 

@@ -13,17 +13,17 @@ _RELATIVE_RESOLUTION = 4e-16  # of the closure: rounding
 
 
 class NormalCondition(NamedTuple):
-    """Normal condition F1 = stress + spring (seat - closure), for n joints.
+    """Normal condition F1 = stress + spring (free_closure - closure), for n joints.
 
     stress: normal stress in Pa, a number or (n,); scale: stress in Pa to which the tolerance
-    refers; spring: stiffness of the surrounding rock in Pa/m (CNS); seat: closure in m at which the
-    spring bears nothing.
+    refers; spring: stiffness of the surrounding rock in Pa/m (CNS); free_closure: closure in m at
+    which the spring bears nothing.
     """
 
     stress: float | Array
     scale: float | Array
     spring: float = 0.0
-    seat: float = 0.0
+    free_closure: float = 0.0
 
 
 def closing_increments(
@@ -47,7 +47,7 @@ def closing_increments(
     for _ in range(_MAX_ITERATIONS):
         F, C = batch.trial(trial)
         assert C is not None
-        spring_stress = condition.spring * (condition.seat - (closure + u))
+        spring_stress = condition.spring * (condition.free_closure - (closure + u))
         residual = F[:, 0] - condition.stress - spring_stress
         # an open joint meets a stress of zero anywhere: then find the closure of first contact
         is_met = (np.abs(residual) <= tolerance * np.asarray(condition.scale)) & (

@@ -48,20 +48,20 @@ class JointPool:
         return np.fromiter(self._place.values(), np.intp, len(self._place))
 
     def assign(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
-        """Make the contacts of the pool equal to `keys`: drop all others and add new ones.
+        """Make the contacts of the pool equal to `keys`: remove all others and add new ones.
 
         keys, mated, returns and raises: as `add`.
         """
         contacts = list(keys)
         self._require_start(mated)
-        self.drop(self._place.keys() - set(contacts))
+        self.remove(self._place.keys() - set(contacts))
         return self.add(contacts, mated)
 
     def add(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
         """Places (n,) of the joints of these contacts; contacts without a joint get a new one.
 
         keys: of n contacts. mated: whether the faces of new contacts interlock, or have never met
-        (`JointLaw.joint`). Raises ValueError for mated=False and a law that is always mated.
+        (`JointLaw.joint`). Raises ValueError for mated=False and a law with permanent interlock.
         """
         contacts = list(keys)
         self._require_start(mated)
@@ -73,7 +73,7 @@ class JointPool:
         """Places (n,) of n new joints without keys, the lowest free ones.
 
         mated: as in `add`. Raises ValueError where n is no whole number >= 0, or for mated=False
-        and a law that is always mated.
+        and a law with permanent interlock.
         """
         n = integer("n", n, 0)
         self._require_start(mated)
@@ -90,8 +90,8 @@ class JointPool:
     def release(self, places: Places) -> None:
         """Release places (m,) of `allocate`; their joints are reset.
 
-        Raises ValueError for a place that is free, belongs to a contact with a key, or occurs twice
-        in `places`.
+        Raises ValueError for a free place, a place of a contact with a key, or a place that occurs
+        twice in `places`.
         """
         released = np.asarray(places, np.intp).tolist()
         allocated = {*range(len(self.batch))}.difference(self._free, self._place.values())
@@ -99,7 +99,7 @@ class JointPool:
             if place not in allocated:
                 raise ValueError(
                     f"places name {place}, which is not allocated, or belongs to a key, or is "
-                    "named twice: give places of allocate(), each once, and drop() keys"
+                    "named twice: give places of allocate(), each once, and remove() keys"
                 )
             allocated.remove(place)
         self._release(released)
@@ -109,11 +109,11 @@ class JointPool:
         self._free = sorted([*self._free, *places], reverse=True)
 
     def _require_start(self, mated: bool) -> None:
-        """Raise ValueError for mated=False and a law that is always mated."""
+        """Raise ValueError for mated=False and a law with permanent interlock."""
         if not mated:
             _ = self.batch.law.unmated_start
 
-    def drop(self, keys: Iterable[Hashable]) -> None:
+    def remove(self, keys: Iterable[Hashable]) -> None:
         """Remove the contacts of these `keys`. Raises KeyError for a key without a contact."""
         removed = list(dict.fromkeys(keys))
         places = [self._place[key] for key in removed]

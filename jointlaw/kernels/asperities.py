@@ -159,8 +159,8 @@ class AsperityElement(Element):
            If asperities yield, Phi, G and kappa are less their values at the plastic indentation
            ("Yielding of asperities").
         5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21), by the planes at the end.
-        6. Dissipated energy, every term >= 0 ("Energy balance"). The part of friction that is work
-           of the joint's own shear degrades slopes from the next step on.
+        6. Dissipated energy, every term >= 0 ("Energy balance"). The work of the joint's own
+           shear, at most this dissipation by friction, degrades slopes from the next step on.
         7. Tangent C = dF/dd ("The consistent tangent"), only with `tangent`.
         """
         k = self.k
@@ -380,8 +380,8 @@ def load_sliders(
     chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
     a = (k.area / k.c1)[:, None, None]
     stiffens = kappa1 > kappa0
-    kept = np.divide(kappa1, kappa0, out=np.zeros_like(kappa0), where=kappa0 > 0)
-    trial = np.where(stiffens, q + a * chord * de, q * kept + a * kappa1 * de)
+    remaining = np.divide(kappa1, kappa0, out=np.zeros_like(kappa0), where=kappa0 > 0)
+    trial = np.where(stiffens, q + a * chord * de, q * remaining + a * kappa1 * de)
     limit = strength * after.G
     size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
     scale = np.divide(limit, size, out=np.ones_like(size), where=size > limit)

@@ -1,7 +1,7 @@
 """Coulomb's joint in a step: docs/theory-incremental.md, "Coulomb joint".
 
 The joint has one spring in closure and one in shear. Its history variables are the shear stress q
-and the softening w, which says what has become of the intact joint:
+and the softening w, the condition of the joint:
 
     w = 0         intact: cohesion c, friction mu, tensile strength
     0 < w <= 1    has slipped: c and mu on the way to their residual values; no tensile strength
@@ -168,7 +168,7 @@ class CoulombElement(Element):
         strength1 = self.strength(w, end)
         rise = strength1 - strength0
         trial = q + dq
-        slips, begin = leave_strength(q, dq, strength0, rise)
+        slips, onset = leave_strength(q, dq, strength0, rise)
         size = np.sqrt(squared_norm(trial))
         weakening_stress = self.shear * self.weakening  # |q*| - k at which w has grown from 0 to 1
         excess = np.where(slips, size - strength1, 0.0)
@@ -181,15 +181,15 @@ class CoulombElement(Element):
 
         residual_from = strength0 + weakening_stress * np.maximum(1.0 - w, 0.0)
         becomes_residual, full = leave_strength(q, dq, residual_from, rise)
-        full = np.where(slips & becomes_residual, np.maximum(full, begin), 1.0)  # where w becomes 1
-        h_begin = self.strength(w, start + begin * (end - start))
-        sigma_middle = start + 0.5 * (begin + full) * (end - start)
+        full = np.where(slips & becomes_residual, np.maximum(full, onset), 1.0)  # where w becomes 1
+        h_onset = self.strength(w, start + onset * (end - start))
+        sigma_middle = start + 0.5 * (onset + full) * (end - start)
         h_middle = self.strength(0.5 * (w + w1), sigma_middle)
         h_full = self.strength(w1, start + full * (end - start))
         size_full = np.where(full < 1.0, np.sqrt(squared_norm(q + full * dq)), size)
-        work = (size_full - h_begin) * (h_begin + 4.0 * h_middle + h_full) / 6.0
+        work = (size_full - h_onset) * (h_onset + 4.0 * h_middle + h_full) / 6.0
         work = work + (size - size_full) * (0.5 * (h_full + h1))
-        dissipated = np.maximum(0.5 * (h_begin * h_begin - h1 * h1) + work, 0.0) / self.shear
+        dissipated = np.maximum(0.5 * (h_onset * h_onset - h1 * h1) + work, 0.0) / self.shear
         scale = np.divide(h1, size, out=np.ones_like(size), where=slips)
         return SlipResult(scale * trial, w1, np.where(slips, dissipated, 0.0), slips, trial, h1)
 

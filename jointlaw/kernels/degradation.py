@@ -23,11 +23,11 @@ def degrade_sliders(
 
     As in a zero increment: springs that disengage release their force, and friction limits q.
     """
-    kept = np.minimum(after.kappa * reciprocal(before.kappa), 1.0)
-    kept = np.where(after.kappa < before.kappa, kept, 1.0)
+    remaining = np.minimum(after.kappa * reciprocal(before.kappa), 1.0)
+    remaining = np.where(after.kappa < before.kappa, remaining, 1.0)
     q2 = q[0] ** 2 + q[1] ** 2
-    size = kept * np.sqrt(q2)
+    size = remaining * np.sqrt(q2)
     limit = strength * after.G
-    scale = kept * np.divide(limit, size, out=np.ones_like(size), where=size > limit)
+    scale = remaining * np.divide(limit, size, out=np.ones_like(size), where=size > limit)
     dissipated = q2 * (reciprocal(before.kappa) - scale**2 * reciprocal(after.kappa))
     return scale * q, np.sum(slider_compliance(k) * dissipated, axis=(0, 1))

@@ -96,9 +96,9 @@ class Element(ABC):
             return 0.0
         start = np.zeros_like(delta)
         virgin = self._virgin_rows(1)
-        closed = virgin.copy()
-        self.step(start, delta, virgin, closed, False)
-        C = self.step(delta, start, closed, closed.copy(), True).C
+        loaded = virgin.copy()
+        self.step(start, delta, virgin, loaded, False)
+        C = self.step(delta, start, loaded, loaded.copy(), True).C
         return 0.0 if C is None else float(C[1, 1, 0])
 
     def first_loading_stiffness(self, closure: Array, reduction: float) -> Array:

@@ -66,7 +66,7 @@ class Step:
     same pass: fractions sliding, slipping and separated, stored and dissipated energy (J/m2),
     damage of bond or cohesion, displacement (m).
 
-    Raises ValueError for an array that is not C-contiguous, which the compiled law cannot use.
+    Raises ValueError unless all arrays are C-contiguous, as the compiled law requires.
     """
 
     def __init__(
@@ -203,7 +203,7 @@ class NativeEngine:
         self._run(library.REFRESH, self._prepare_call(state, n))
 
     def evaluate(self, quantity: str, state: Array, n: int) -> Array:
-        """As `NumpyEngine.evaluate`; the traction is that of a zero increment."""
+        """As `NumpyEngine.evaluate`; the traction is from a zero increment."""
         operation, *shape = {
             "traction": (library.ADVANCE, n, self._law.dim),
             "stiffness": (library.STIFFNESS, n),

@@ -26,12 +26,12 @@ from .interlock import Planes
 
 def update_indentation(k: FacetTables, indentation: Array, y: Array) -> Array:
     """Plastic indentation (M, B) of every facet once the closures y (M, B) are reached."""
-    own = np.maximum(indentation, y - k.yield_depth[:, None])
-    return np.maximum(own, own[k.opposite])
+    single = np.maximum(indentation, y - k.yield_depth[:, None])
+    return np.maximum(single, single[k.opposite])
 
 
 def subtract_plastic(elastic: Cells, indented: Cells | None) -> Cells:
-    """Cells at y less the cells at the plastic indentation; `elastic` itself if that is None."""
+    """Cells at y less the cells at the plastic indentation; `elastic` itself for None."""
     if indented is None:
         return elastic
     compression = elastic.y - indented.y
@@ -75,9 +75,9 @@ def plastic_softening(
     """
     indents = indented1.y - indented0.y > ROUNDING_TOLERANCE * indented1.y
     indents = indents & (after.kappa > 0).any(axis=1)
-    own = sets_own_indentation(k, after.y, indented1.y)
+    is_own = sets_own_indentation(k, after.y, indented1.y)
     shear = np.sum(push * np.where(after.kappa > 0, indented1.kappa, 0.0), axis=2)
     along = end.n * (k.area[:, None] * indented1.slope)
     along = along + np.einsum("edmb,emb->dmb", end.basis, shear) / k.lam
-    pressing = np.where(own, end.g, end.g[:, k.opposite])
+    pressing = np.where(is_own, end.g, end.g[:, k.opposite])
     return np.einsum("imb,jmb->ijb", np.where(indents, along, 0.0), pressing)

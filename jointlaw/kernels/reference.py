@@ -108,11 +108,11 @@ class LawTables:
 
     def element_rows(self, *states: Array) -> Iterator[tuple[Element, list[Array]]]:
         """Yield every element with its rows of these states, as views."""
-        begin = self.dim + 1
+        first = self.dim + 1
         for element in self.elements:
-            end = begin + sum(element.rows.values())
-            yield element, [state[begin:end] for state in states]
-            begin = end
+            end = first + sum(element.rows.values())
+            yield element, [state[first:end] for state in states]
+            first = end
 
 
 def step(k: LawTables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
@@ -170,9 +170,9 @@ def stiffness(k: LawTables, state: Array) -> Array:
 def measures(k: LawTables, state: Array) -> Measures:
     """Measures of a batch of states (rows, B)."""
     delta = state[: k.dim]
-    (first, (rows,)), *others = k.element_rows(state)
+    (first, (rows,)), *remaining = k.element_rows(state)
     result = first.measures(delta, rows)
     stored_energy = result.stored_energy
-    for element, (rows,) in others:
+    for element, (rows,) in remaining:
         stored_energy = stored_energy + element.stored_energy(delta, rows)
     return result._replace(stored_energy=stored_energy)

@@ -120,7 +120,7 @@ class CoulombLaw(Law, kind="coulomb"):
     def strength_reduced(self, factor: float) -> Self:
         """As `Law.strength_reduced`.
 
-        Raises ValueError for a factor that is not > 0, and NotImplementedError for a subclass with
+        Raises ValueError unless the factor is > 0, and NotImplementedError for a subclass with
         elements of its own that does not define the method.
         """
         factor = more_than("factor", factor, 0.0)

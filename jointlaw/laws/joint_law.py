@@ -180,12 +180,13 @@ class JointLaw(Law, kind="joint"):
         """As `Law.strength_reduced`: K F^2 and lam/F^2 keep the normal stiffness.
 
         The peak of shear stress is divided by F within 1 % for F from 0.7 to 2. A subclass with
-        elements of its own defines the method for them. Raises ValueError for a factor that is not
-        > 0, and NotImplementedError for such a subclass that does not define it.
+        elements of its own defines the method for them. Raises ValueError unless the factor is
+        > 0, and NotImplementedError for such a subclass without the method.
         """
         factor = more_than("factor", factor, 0.0)
-        known = all(isinstance(one, AsperityElement | BondElement) for one in self.tables.elements)
-        if not known and type(self).strength_reduced is JointLaw.strength_reduced:
+        elements = self.tables.elements
+        is_complete = all(isinstance(one, AsperityElement | BondElement) for one in elements)
+        if not is_complete and type(self).strength_reduced is JointLaw.strength_reduced:
             Law.strength_reduced(self, factor)
         bond = self.bond
         if bond is not None:

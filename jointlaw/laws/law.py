@@ -1,9 +1,9 @@
 """Base class of joint laws: joints, steps, stiffness, strength and files of every law.
 
 A law is a frozen dataclass of declared parameters (`parameters/declared.py`). Its `tables` list the
-elements whose tractions add up to the traction of a joint (`kernels/element.py`), and all that is
-here follows from the parameters and the elements. A class of a user's own needs `closure_range`,
-`tables`, and for strength reduction `strength_reduced`.
+elements whose tractions add up to the traction of a joint (`kernels/element.py`), and this module
+derives all else from the parameters and the elements. A class of a user's own needs `tables`, a
+`closure_range`, and for strength reduction `strength_reduced`.
 """
 
 from __future__ import annotations
@@ -205,17 +205,17 @@ class Law:
     def secant_stiffness(self, normal_stress: float) -> tuple[float, float]:
         """Secant stiffness in closure and elastic stiffness in shear (Pa/m) at a normal stress.
 
-        normal_stress: in Pa, > 0, of first loading without shear. Shear stiffness is that of joints
-        that do not slip; 0 for a law of closure alone. Raises ValueError as `closure` does.
+        normal_stress: in Pa, > 0, of first loading without shear. The shear stiffness is elastic,
+        without slip; 0 for a law of closure alone. Raises ValueError as `closure` does.
         """
         stress = more_than("normal_stress", normal_stress, 0.0)
         closure = self.closure(stress)
         delta = np.zeros((self.dim, 1))
         delta[0] = closure
-        first, *others = self.tables.elements
-        borne = [float(element.normal_stress(np.array(closure))) for element in others]
+        first, *remaining = self.tables.elements
+        borne = [float(element.normal_stress(np.array(closure))) for element in remaining]
         shear = first.shear_stiffness(delta, stress - sum(borne))
-        for element, part in zip(others, borne, strict=True):
+        for element, part in zip(remaining, borne, strict=True):
             shear += element.shear_stiffness(delta, part)
         return float(stress / closure), shear
 

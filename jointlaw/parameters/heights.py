@@ -149,7 +149,7 @@ def require_heights(heights: Any) -> None:
     if missing:
         raise ValueError(
             f"heights = {heights!r} has no {', '.join(missing)}: give GammaHeights, Heights, None, "
-            "or a class with these (a histogram in Heights stands for any other distribution)"
+            "or a class with these (a histogram in Heights represents any other distribution)"
         )
     kind = type(heights)
     methods = {getattr(kind, name) for name in ("__hash__", "__repr__")}
@@ -171,7 +171,7 @@ def require_heights(heights: Any) -> None:
 
 
 def _require_consistent_density(heights: Any, points: Array) -> None:
-    """Raise ValueError for a density that is clearly not the derivative of `cdf`."""
+    """Raise ValueError unless the density is roughly the derivative of `cdf`."""
     x, weight = np.polynomial.legendre.leggauss(16)
     half = 0.5 * np.diff(points)
     density = np.asarray(heights.pdf(points[:-1, None] + half[:, None] * (x + 1.0)), float)

@@ -43,7 +43,7 @@ def _lines(values: Any, kinds: Kinds, path: str, shown: Mapping[str, Any]) -> li
     if not names:
         raise ValueError(
             f"{path} = {values!r}: no file can name {type(values).__name__}; known are "
-            f"{', '.join(kinds)} (a histogram stands for any other heights; CONTRIBUTING.md tells "
+            f"{', '.join(kinds)} (a histogram represents any other heights; CONTRIBUTING.md says "
             "how to add a kind)"
         )
     lines = [f'kind = "{names[0]}"'] if names[0] != next(iter(kinds)) else []

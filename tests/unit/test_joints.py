@@ -106,7 +106,7 @@ def test_places_without_keys_are_used_again_and_keep_their_history(law):
 def test_a_snapshot_restores_a_pool_and_what_is_refused_changes_none(law):
     pool = jl.JointPool(law)
     pool.batch.update(np.eye(3) * 1e-7, where=pool.add("abc"))
-    pool.drop("a")
+    pool.remove("a")
     keys, state = pool.keys, pool.snapshot()
     other = jl.JointPool(law)
     other.add("xyz")
@@ -114,7 +114,7 @@ def test_a_snapshot_restores_a_pool_and_what_is_refused_changes_none(law):
     with pytest.raises(ValueError, match="keys name 1 contacts, state holds 2 joints"):
         other.restore("b", state)
     with pytest.raises(KeyError, match="x"):
-        other.drop(["b", "x"])
+        other.remove(["b", "x"])
     with pytest.raises(ValueError, match="mated=False"):
         other.assign("cd", mated=False)
     assert other.keys == ["b", "c"]

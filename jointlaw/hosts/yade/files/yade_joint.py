@@ -127,7 +127,7 @@ class LiveLaw:
 
     def keep(self, mask):
         """Forget the contacts where `mask` is False."""
-        self.pool.drop([key for key, kept in zip(self.pool.keys, mask) if not kept])
+        self.pool.remove([key for key, kept in zip(self.pool.keys, mask) if not kept])
         self.find()
 
     def find(self):

@@ -23,6 +23,7 @@ from .laws.joint_law import JointLaw
 from .laws.law import Law
 from .paper import closed_form
 from .paper.secant import secant
+from .parameters.aperture import Aperture
 from .parameters.asperity import Asperity
 from .parameters.bond import Bond
 from .parameters.declared import declared, parameter
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from .tables.tabulate import tabulate
 
 __all__ = [
+    "Aperture",
     "Asperity",
     "Bond",
     "ClosureCurve",

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from .. import presets
 from ..laws.joint_law import JointLaw
 from ..parameters import keys
+from ..parameters.aperture import APERTURE_TABLE, Aperture
 from ..parameters.resolution import NAMED_RESOLUTIONS
 from ..parameters.rock import ROCK, require_rock
 from ..support import units
@@ -113,6 +114,15 @@ def read_law(options: argparse.Namespace) -> Any:
     return replace(law, resolution=options.resolution) if options.resolution else law
 
 
+def read_aperture(name_or_file: str) -> Aperture | None:
+    """The hydraulic aperture in a law file; None for a preset or a file without [aperture]."""
+    path = Path(name_or_file)
+    if name_or_file in presets.names() or not path.is_file():
+        return None
+    table = keys.read(path, "law file").get(APERTURE_TABLE)
+    return None if table is None else Aperture.from_table(table, str(path))
+
+
 def _read_law_file(path: Path, default_rock: bool) -> Any:
     """The law in a TOML file; contacts of `ROCK` complete a file without [asperity] on request."""
     tables = keys.read(path, "law file")
@@ -160,7 +170,7 @@ def write_results(
 
 
 def settings(options: argparse.Namespace) -> dict[str, Any]:
-    """The options of a command for its summary, without those that only direct the output."""
+    """The options of a command for its summary, without the options that direct the output."""
     return {k: v for k, v in vars(options).items() if k not in ("run", "out", "force", "json")}
 
 

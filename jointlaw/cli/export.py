@@ -8,24 +8,33 @@ from typing import Any
 
 from ..hosts import HOSTS, ExportOption, Host
 from ..hosts.c.export import identifier
+from ..parameters.aperture import Aperture
 from ..support.files import clear_run
-from .command import LAW, OUT, Command, Option, option, quantity, read_law
+from .command import LAW, OUT, Command, Option, option, quantity, read_aperture, read_law
 
 
 def _run(options: argparse.Namespace) -> None:
     law = read_law(options)
+    aperture = read_aperture(options.law)
     host = HOSTS[options.host]
     with TemporaryDirectory() as complete:  # a law that is refused leaves the folder unchanged
-        text = _export(host, law, complete, options)
+        text = _export(host, law, aperture, complete, options)
         clear_run(options.out)
         for file in Path(complete).iterdir():
             shutil.copy(file, options.out)
     print(f"{text}\nrun: cd {options.out} && {host.run_command}")
 
 
-def _export(host: Host, law: Any, folder: str, options: argparse.Namespace) -> str:
+def _export(
+    host: Host,
+    law: Any,
+    aperture: Aperture | None,
+    folder: str,
+    options: argparse.Namespace,
+) -> str:
     """Write the files of a host; returns the text for the user."""
     arguments = {one.keyword: getattr(options, one.keyword) for one in host.options}
+    arguments["aperture"] = aperture
     if host.names_tables:
         arguments["name"] = identifier(Path(options.law).stem)
     result = host.load(host.function)(law, folder, **arguments)

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import presets
 from ..calibration import datasets
+from ..calibration.aperture import FlowConditions, FlowFit, fit_flow, read_flow
 from ..calibration.envelopes import ENVELOPES, envelope_strength, peak_and_last
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
@@ -45,8 +46,19 @@ SHEAR_OPTIONS = (
 )
 
 
+FLOW_OPTIONS = (
+    "flow_column",
+    "flow_rate",
+    "outlet_pressure",
+    "flow_radii",
+    "flow_length",
+    "flow_width",
+    "flow_up_to",
+)
+
+
 class HeldOut(NamedTuple):
-    """Points of a closure test that are predicted instead of fitted."""
+    """Points of a closure test, to be predicted instead of fitted."""
 
     stress: Array  # (n,) in Pa
     closure: Array  # (n,) in m, of the joint alone
@@ -84,8 +96,14 @@ def _run(options: argparse.Namespace) -> None:
     files: Contents = {
         "fit.png": partial(fit.plot, held_out=held_out, predicted=predicted),
         "law.toml": fit.law.to_toml,
-        "report.md": text,
     }
+    if options.flow:
+        flow_fit = _fit_flow(options, fit)
+        text += flow_fit.report()
+        summary |= flow_fit.summary()
+        law_text = f"{fit.law.to_toml()}\n{flow_fit.aperture.to_toml()}"
+        files = {**files, "law.toml": law_text, "flow.png": flow_fit.plot}
+    files = {**files, "report.md": text}
     write_results(options, files, summary, text)
 
 
@@ -102,6 +120,13 @@ def _require_consistent(options: argparse.Namespace) -> None:
         _refuse(options, SHEAR_OPTIONS, "direct shear tests: name their files after --shear")
     if options.up_to and options.cycle:
         raise ValueError("--cycle fits all points: leave --up-to out")
+    if options.flow and not (options.data and options.cycle):
+        raise ValueError(
+            "--flow needs a closure test with --cycle: flow on unloading follows the closure, "
+            "which a fit to loading alone does not predict"
+        )
+    if not options.flow:
+        _refuse(options, FLOW_OPTIONS, "a flow test: name its file after --flow")
 
 
 def _refuse(options: argparse.Namespace, names: Sequence[str], subject: str) -> None:
@@ -198,6 +223,50 @@ def _split_shear_tests(
             "one out"
         )
     return list(compress(tests, is_fitted)), list(compress(tests, np.logical_not(is_fitted)))
+
+
+def _fit_flow(options: argparse.Namespace, fit: Fit) -> FlowFit:
+    """The hydraulic aperture fitted to the flow test, with the law fitted to the cycle."""
+    test = read_flow(
+        options.flow,
+        _flow_conditions(options),
+        options.flow_column,
+        options.decimal,
+        options.outliers,
+    )
+    return fit_flow(test, fit.law, options.flow_up_to, options.compliance)
+
+
+def _flow_conditions(options: argparse.Namespace) -> FlowConditions | None:
+    """Rate, outlet pressure and geometry of a flow test with pressures; None without them.
+
+    Raises ValueError naming what is missing.
+    """
+    geometry = options.flow_radii or options.flow_length or options.flow_width
+    if not (geometry or options.flow_rate or options.outlet_pressure):
+        return None
+    missing = [
+        f"--{name.replace('_', '-')}"
+        for name in ("flow_rate", "outlet_pressure")
+        if getattr(options, name) is None
+    ]
+    is_rectangle = options.flow_length and options.flow_width
+    if bool(options.flow_radii) == bool(is_rectangle):
+        missing.append("the geometry, either --flow-radii or --flow-length with --flow-width")
+    if missing:
+        raise ValueError(f"apertures from pressures need {', '.join(missing)}")
+    conditions = {
+        "rate": options.flow_rate,
+        "outlet_pressure": options.outlet_pressure,
+        "viscosity": options.viscosity,
+    }
+    if options.flow_radii:
+        if len(options.flow_radii) != 2:
+            raise ValueError(
+                f"--flow-radii gives {len(options.flow_radii)} radii: write two, inner and outer"
+            )
+        return FlowConditions.radial(options.flow_radii, **conditions)
+    return FlowConditions.linear(options.flow_length, options.flow_width, **conditions)
 
 
 def _report_held_out(held_out: HeldOut, error: Array) -> str:
@@ -326,6 +395,65 @@ _SHEAR = Group(
         ),
     ),
 )
+_FLOW = Group(
+    "flow test (hydraulic aperture), with --cycle",
+    (
+        option(
+            "--flow",
+            metavar="FILE",
+            help="CSV or XLSX file with normal stress and hydraulic aperture, or inlet pressure at "
+            "a constant flow rate, over the same cycle",
+        ),
+        option(
+            "--flow-column",
+            metavar="NAME:UNIT",
+            help="hydraulic aperture or inlet pressure, such as p_in:kPa",
+        ),
+        option(
+            "--flow-up-to",
+            metavar="STRESS",
+            type=quantity("Pa", positive=True),
+            help="fit the aperture up to this stress of loading, predict the others: 5.3MPa",
+        ),
+        option(
+            "--flow-rate",
+            metavar="RATE",
+            type=quantity("m3/s", positive=True),
+            help="of pressures: constant flow rate, such as 5ml/min",
+        ),
+        option(
+            "--outlet-pressure",
+            metavar="PRESSURE",
+            type=quantity("Pa"),
+            help="of pressures: pressure at the outlet, such as 101.3kPa",
+        ),
+        option(
+            "--flow-radii",
+            metavar="INNER,OUTER",
+            type=quantities("m", positive=True),
+            help="of pressures: radii of radial flow, such as 4mm,61mm",
+        ),
+        option(
+            "--flow-length",
+            metavar="LENGTH",
+            type=quantity("m", positive=True),
+            help="of pressures: length along the flow, with --flow-width",
+        ),
+        option(
+            "--flow-width",
+            metavar="LENGTH",
+            type=quantity("m", positive=True),
+            help="of pressures: width across the flow",
+        ),
+        option(
+            "--viscosity",
+            metavar="VISCOSITY",
+            type=quantity("Pas", positive=True),
+            default="1.002mPas",
+            help="of pressures: viscosity (default 1.002mPas, water at 20 degrees Celsius)",
+        ),
+    ),
+)
 _FILES = Group(
     "files",
     (
@@ -380,6 +508,7 @@ COMMAND = Command(
         ),
         _CLOSURE,
         _SHEAR,
+        _FLOW,
         _FILES,
         _PARAMETERS,
         Group("output", (*OUT, JSON, PICTURE_FORMAT)),

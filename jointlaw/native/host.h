@@ -29,6 +29,7 @@
 #ifndef JOINTLAW_H
 #define JOINTLAW_H
 #ifndef __CUDACC_RTC__
+#include <math.h>
 #include <stddef.h>
 #endif
 #ifndef JLAW_FUNCTION
@@ -112,6 +113,26 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle);
 /* Transform a state after the two bodies are exchanged: axes 1 and 3 reverse, axis 2 stays. The shear
  * displacement along axis 2 changes its sign, along axis 3 it does not. Exact. */
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s);
+
+/* Hydraulic aperture e (m) of a joint at a closure (m), and its derivative de/dclosure, from -1 to 0,
+ * unless `slope` is NULL: as jl.Aperture of Python. The transmissivity is e^3/12 (m3): the flow per
+ * width is e^3/(12 viscosity) times the pressure gradient. NAME.h has NAME_aperture if the law file
+ * has a table [aperture]. */
+typedef struct {
+  double hydraulic, at, length; /* m: aperture at the closure `at`; closure that divides it by e */
+} jlaw_aperture;
+
+JLAW_FUNCTION static inline double jlaw_hydraulic_aperture(const jlaw_aperture *map, double closure,
+                                                           double *slope)
+{
+  const double L = map->length;
+  const double transition = map->hydraulic <= L ? map->at + L * log(map->hydraulic / L)
+                                                : map->at + (map->hydraulic - L); /* e = L there */
+  const double opening = transition - closure;
+  const double ratio = opening < 0.0 ? exp(opening / L) : 1.0;
+  if (slope) *slope = -ratio;
+  return opening > 0.0 ? L * ratio + opening : L * ratio;
+}
 
 /* Hash of the parameters of the law: store it with saved states, which fit only this law */
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);

@@ -9,11 +9,13 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from ..support.checks import one_of
+from .aperture import APERTURE_TABLE, Aperture
 from .declared import parameters_of
 from .keys import keys_of, validate_table
 
 VERSION = 1  # of the keys; a file without a version is of version 1
-OTHER_KEYS = ("version", "about")  # about: a free table for title, source and notes
+# about: a free table for title, source and notes; aperture: a map beside the law, not a part of it
+OTHER_KEYS = ("version", "about", APERTURE_TABLE)
 Kinds = Mapping[str, Any]
 
 
@@ -26,13 +28,14 @@ def law_text(law: Any, kinds: Kinds, shown: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def text_or_reason(law: Any) -> tuple[str, str]:
+def text_or_reason(law: Any, flow: Aperture | None = None) -> tuple[str, str]:
     """TOML text of a law and "", or "" and the reason if a parameter has a class without a name.
 
-    For files that show the parameters but do not need them.
+    For files that show the parameters but do not need them. flow: hydraulic aperture to add.
     """
     try:
-        return law.to_toml(), ""
+        text = law.to_toml()
+        return (f"{text}\n{flow.to_toml()}" if flow else text), ""
     except ValueError as error:
         return "", str(error)
 
@@ -86,6 +89,8 @@ def law_of(kinds: Kinds, data: Mapping[str, Any], where: str) -> Any:
             f"{where}: key 'version' = {version!r}: this jointlaw reads version {VERSION}; write "
             "the law again with this version, or install the one that wrote it"
         )
+    if APERTURE_TABLE in data:
+        Aperture.from_table(data[APERTURE_TABLE], where)  # validated here, used by exports
     keys = {key: value for key, value in data.items() if key not in OTHER_KEYS}
     try:
         return build(kinds, keys, where, "")

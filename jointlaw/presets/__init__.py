@@ -31,7 +31,7 @@ def load(name: str) -> JointLaw:
 def load_any(name_or_file: str) -> JointLaw:
     """The law of a preset or of a TOML file.
 
-    Raises ValueError for a name that is neither, and for an invalid file.
+    Raises ValueError for an unknown name, and for an invalid file.
     """
     if name_or_file in names():
         return load(name_or_file)

@@ -5,6 +5,7 @@ import re
 
 COMMON = {  # a practical unit for each SI unit, for examples in messages
     "Pa": "MPa", "m": "mm", "Pa/m": "GPa/m", "rad": "deg", "N": "kN", "m2": "cm2",
+    "m3/s": "ml/min", "Pas": "mPas",
 }  # fmt: skip
 _PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0,
            "k": 1e3, "M": 1e6, "G": 1e9}  # fmt: skip
@@ -19,6 +20,15 @@ _FACTORS = {  # SI units in each unit
     "rad": {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180},
     "N": _N,
     "m2": {"m2": 1.0, "m²": 1.0, "cm2": 1e-4, "cm²": 1e-4, "mm2": 1e-6, "mm²": 1e-6},
+    "m3/s": {
+        "m3/s": 1.0,
+        "m³/s": 1.0,
+        "l/s": 1e-3,
+        "ml/s": 1e-6,
+        "l/min": 1e-3 / 60,
+        "ml/min": 1e-6 / 60,
+    },
+    "Pas": {"Pas": 1.0, "mPas": 1e-3},
 }
 _PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 

@@ -2,11 +2,13 @@
 
 import math
 import re
+from dataclasses import astuple
 from pathlib import Path
 
 from ...kernels.pack import pack, ring_sizes
 from ...laws.law import Law
 from ...native.layout import MAX_AZIMUTHS, TABLE_FORMAT, jointlaw_h
+from ...parameters.aperture import Aperture
 from ...parameters.toml import text_or_reason
 from ...support.checks import Array
 from ...support.files import write_files
@@ -27,13 +29,15 @@ _TAKEN = re.compile(  # words of C and C++
 _MODEL = "granite"  # the name of the tables in these files
 
 
-def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
+def export_c(
+    law: Law, directory: str | Path, name: str = "joint", aperture: Aperture | None = None
+) -> list[str]:
     """Write all that a C or C++ code needs to run this law; the folder may be copied away.
 
     >>> names = jl.export_c(law, "joint-for-c")
 
     law: any law. directory: made if missing; files of the same names are replaced. name: of the
-    tables, an identifier of C.
+    tables, an identifier of C. aperture: its hydraulic aperture, for `jlaw_hydraulic_aperture`.
 
     Writes `jointlaw.h` (the law), `NAME.jlaw` (its tables, for `jlaw_read`), `NAME.h` (the same as
     constants), `jointlaw.c` (compiles the law), `example.c`, `example.cpp`, `example.f90`,
@@ -42,8 +46,8 @@ def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     """
     require_name(name)
     texts = {
-        f"{name}.jlaw": table_text(law),
-        f"{name}.h": header_text(law, name),
+        f"{name}.jlaw": table_text(law, aperture),
+        f"{name}.h": header_text(law, name, aperture),
         HEADER: jointlaw_h(),
         **{file: file_text(file).replace(_MODEL, name) for file in FILES},
     }
@@ -77,14 +81,14 @@ def identifier(text: str) -> str:
     return name if _free(name) else f"joint_{name}".rstrip("_")
 
 
-def table_text(law: Law) -> str:
+def table_text(law: Law, aperture: Aperture | None = None) -> str:
     """The tables as text for `jlaw_read`: a keyword and its numbers a line, hexadecimal, exact.
 
     The last line holds a sum (FNV-1a) of the bytes before it, by which damage is told.
     """
     numbers, arrays = packed(law)
     lines = [f"jointlaw tables {TABLE_FORMAT}", f"fingerprint {law.fingerprint}"]
-    lines += [f"# {line}" for line in _parameters_as_comment(law)]
+    lines += [f"# {line}" for line in _parameters_as_comment(law, aperture)]
     lines += [f"{key} {x if isinstance(x, int) else _exact(x)}" for key, x in numbers.items()]
     for key, array in arrays.items():
         lines.append(key)
@@ -93,10 +97,12 @@ def table_text(law: Law) -> str:
     return f"{text}sum {_sum(text.encode()):016x}\n"
 
 
-def header_text(law: Law, name: str) -> str:
-    """The tables as constants of C: `&NAME` is the law."""
+def header_text(law: Law, name: str, aperture: Aperture | None = None) -> str:
+    """The tables as constants of C: `&NAME` is the law, `&NAME_aperture` its hydraulic aperture."""
     numbers, arrays = packed(law)
-    comment = "\n".join(" * " + line.replace("*/", "* /") for line in _parameters_as_comment(law))
+    comment = "\n".join(
+        " * " + line.replace("*/", "* /") for line in _parameters_as_comment(law, aperture)
+    )
     guard = f"JOINTLAW_TABLES_{name.upper()}"
     parts = [
         f"/* {name}: tables of a joint law, made by `jointlaw export c`.\n{comment}\n */",
@@ -109,6 +115,9 @@ def header_text(law: Law, name: str) -> str:
         rows = ",\n".join(", ".join(map(repr, row.tolist())) for row in array.reshape(-1, 4))
         size = max(array.size, 1)  # C has no empty arrays; Coulomb's joint has no facets
         parts.append(f"{_CONSTANT} double {name}_{key}[{size}] = {{\n{rows or '0.0'}}};")
+    if aperture:
+        values = ", ".join(map(repr, astuple(aperture)))
+        parts.append(f"{_CONSTANT} jlaw_aperture {name}_aperture = {{{values}}};")
     values = ", ".join(map(repr, numbers.values()))
     tables = ", ".join(f"{name}_{key}" for key in arrays)
     parts.append(
@@ -117,9 +126,9 @@ def header_text(law: Law, name: str) -> str:
     return "\n".join([*parts, ""])
 
 
-def _parameters_as_comment(law: Law) -> list[str]:
+def _parameters_as_comment(law: Law, aperture: Aperture | None = None) -> list[str]:
     """Lines with the parameters as TOML, or with the reason why they have no such text."""
-    text, reason = text_or_reason(law)
+    text, reason = text_or_reason(law, aperture)
     return text.splitlines() or [f"without parameters: {reason}"]
 
 

@@ -5,6 +5,7 @@ from textwrap import fill
 
 from ...laws.law import Law
 from ...native.layout import jointlaw_h
+from ...parameters.aperture import Aperture
 from ...support.checks import number
 from ...support.files import write_files
 from .. import DEFAULT_SEATING
@@ -14,7 +15,11 @@ MAX_TEST_STRESS = 2e6  # Pa: normal stress of the shear tests, at most
 
 
 def export_fem(
-    law: Law, directory: str | Path, name: str = "joint", seating: float = DEFAULT_SEATING
+    law: Law,
+    directory: str | Path,
+    name: str = "joint",
+    seating: float = DEFAULT_SEATING,
+    aperture: Aperture | None = None,
 ) -> list[str]:
     """Write all files that a finite-element code needs to run this joint; the folder may be copied.
 
@@ -23,7 +28,8 @@ def export_fem(
     law: a law with shear; a law with a plane is for 2-D only. directory: created if missing; files
     of the same names are replaced. name: of the behaviours, an identifier of C; NAME is a cohesive
     zone, NAME_layer a thin layer of solid elements. seating: normal stress in Pa, > 0,
-    of the joint before the first step, from which displacements count.
+    of the joint before the first step, from which displacements count. aperture: its hydraulic
+    aperture, `NAME_aperture` of `NAME.h`.
 
     Writes `jointlaw.h` and `jointlaw.c` (the law), `NAME.h` (its tables), `jointlaw_fem.h`,
     `mgis.c` and `umat.c` with a `Makefile`, direct shear tests for OpenGeoSys and Kratos, and
@@ -44,7 +50,7 @@ def export_fem(
     texts = {
         "jointlaw.h": jointlaw_h(),
         "jointlaw.c": c.file_text("jointlaw.c"),
-        f"{name}.h": c.header_text(law, name),
+        f"{name}.h": c.header_text(law, name, aperture),
     }
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
     names = [f'"State{i}"' for i in range(1, len(start))] + ['"Initialised"']

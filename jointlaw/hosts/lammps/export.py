@@ -1,9 +1,11 @@
 """Export of a joint law to LAMMPS: tables, the plug-in and an input script, in one folder."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 from ...laws.law import Law
 from ...native.layout import jointlaw_h
+from ...parameters.aperture import Aperture
 from ...parameters.toml import text_or_reason
 from ...support.files import write_files
 from ...tables.tabulate import require_3d
@@ -14,11 +16,14 @@ FILES = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh", "in.tower", 
 WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 
-def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
+def export_lammps(
+    law: Law, directory: str | Path, name: str = "joint", aperture: Aperture | None = None
+) -> list[str]:
     """Write all that an unmodified LAMMPS needs to run this joint; the folder may be copied away.
 
     law: a law in 3-D (`plane=None`). directory: made if missing; files of the same names are
-    replaced. name: of the tables, an identifier of C.
+    replaced. name: of the tables, an identifier of C. aperture: its hydraulic aperture; `joint.in`
+    and `law.toml` hold its numbers.
 
     Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
     the script `in.tower`, `joint.in` (its variables for this law), `law.toml` (the parameters,
@@ -31,16 +36,20 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     c.require_name(name)
     source = Path(__file__).with_name("files")
     files: dict[str, str | bytes] = {
-        f"{name}.jlaw": c.table_text(law),
+        f"{name}.jlaw": c.table_text(law, aperture),
         "joint.in": (
             "# made by `jointlaw export lammps`: variables of in.tower for this joint\n"
             f"variable law string {name}.jlaw\n"
             f"variable closure0 equal {float(law.closure(WEIGHT))!r}   # m, under {WEIGHT:g} Pa\n"
+            + "".join(
+                f"variable aperture_{key} equal {value!r}   # m\n"
+                for key, value in (asdict(aperture) if aperture else {}).items()
+            )
         ),
         **{file: (source / file).read_bytes() for file in FILES},
         "jointlaw.h": jointlaw_h(),
     }
-    parameters, _ = text_or_reason(law)
+    parameters, _ = text_or_reason(law, aperture)
     if parameters:
         files["law.toml"] = parameters
     folder = write_files(directory, files)

@@ -1,9 +1,11 @@
 """Export of a joint law to YADE: table, law, adapter and script, in one folder."""
 
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from ...laws.law import Law
+from ...parameters.aperture import Aperture
 from ...parameters.toml import text_or_reason
 from ...support.files import write_files, write_json
 from ...tables import joint_table
@@ -13,13 +15,16 @@ from ...tables.tabulate import require_3d, tabulate
 COPIED = ("yade_joint.py", "joint_table.py", "settle_and_incline.py", "README.md")
 
 
-def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
+def export_yade(
+    law: Law, directory: str | Path, aperture: Aperture | None = None, **options: Any
+) -> JointTable:
     """Write all files that an unmodified YADE needs to run this joint; the folder may be copied.
 
     Parameters
     ----------
     law: a law in 3-D (`plane=None`).
     directory: folder to write to; created if missing, files of the same names are replaced.
+    aperture: its hydraulic aperture; the metadata of the table and `law.toml` hold its numbers.
     options: of the table, as in `tabulate`.
 
     Writes `joint.txt` (the table), `law.toml` (for live mode), `yade_joint.py` with
@@ -32,8 +37,10 @@ def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
     """
     require_3d(law, "motion in YADE")
     table = tabulate(law, **options)
+    if aperture:
+        table = replace(table, metadata={**table.metadata, "aperture": asdict(aperture)})
     report = table.report(law)
-    parameters, _ = text_or_reason(law)
+    parameters, _ = text_or_reason(law, aperture)
     law_file = {"law.toml": parameters} if parameters else {}
     folder = write_files(directory, law_file)
     if not law_file:  # one from an earlier export is of another law

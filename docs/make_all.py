@@ -81,6 +81,9 @@ PARTS = {
     ),
     # blocks.md
     "shaken-slab": Part("docs/measure/blocks.py shaken-slab", quoted_in="blocks.md"),
+    # water.md, blocks.md
+    "mean-gap": Part("docs/measure/aperture.py mean-gap", page="water.md"),
+    "slide-flow": Part("docs/measure/aperture.py slide", quoted_in="water.md blocks.md"),
     # pictures
     "moving": Part("docs/draw/moving.py FOLDER", pictures={"moving.gif": "moving.gif"}),
     "why": Part(

@@ -43,7 +43,12 @@ def recorded_figures(*tests):
 
 def extremes():
     """Extreme laws, alone and in pairs of extremes: how many pass every check, and the worst."""
-    tests = "alone", "in_pairs", "force_is_lipschitz", "results_scale"
+    tests = (
+        "one_extreme_parameter",
+        "two_extreme_parameters",
+        "force_is_lipschitz",
+        "results_scale",
+    )
     figures = recorded_figures(*(f"extremes.py::test_{name}" for name in tests))
     alone = [passes for (passes,) in figures["alone"]]
     passed, refused, count = (sum(column) for column in zip(*figures["pairs"], strict=True))

@@ -99,7 +99,8 @@ class Aperture:
     def from_toml(cls, path: str | Path) -> Self:
         """The aperture in the TOML file of a law.
 
-        Raises ValueError naming file and key, also for a file without [aperture].
+        path: of the file. Raises ValueError naming file and key, also for a file without
+        [aperture].
         """
         tables = read(Path(path), "law file")
         if APERTURE_TABLE not in tables:

@@ -82,6 +82,7 @@ def test_blocks_run_as_printed(page):
 # by what they begin with: too long for here, and what runs the same instead
 LONG = {
     "jointlaw fit closure.csv --shear": "tests/verification/test_fit_shear_files.py",
+    "jointlaw fit closure.csv --cycle --flow": "tests/verification/test_aperture.py",
     "jointlaw shear out/specimen/law.toml": "tests/verification/test_fit_shear_files.py",
     "jointlaw fit grimsel_vd1_closure --out": "tests/unit/test_commands.py",
     "python -m dem_demo ablate SCENE": "tests/examples/test_rocks.py",

@@ -14,7 +14,15 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.calibration.aperture import FlowConditions, closure_along, fit_aperture, read_flow
+from jointlaw.calibration.aperture import (
+    FlowConditions,
+    closure_along,
+    fit_aperture,
+    fit_flow,
+    read_flow,
+)
+from jointlaw.calibration.datasets import read_closure
+from jointlaw.calibration.measured import first_loading
 from jointlaw.cli.main import main
 from jointlaw.hosts import HOSTS
 
@@ -274,6 +282,20 @@ def test_measured_flow_on_unloading_follows_closure(specimen, tmp_path):
     for name, (at_largest, unloading) in MEASURED[specimen].items():
         percent = 100 * np.array([*errors[name].values()])
         assert percent == pytest.approx([at_largest, unloading], abs=0.6)  # printed as integers
+
+
+@measured_flow
+@pytest.mark.parametrize(
+    ("specimen", "at_largest", "unloading"), [("vd1", 11, 19), ("vd2", 19, 51)]
+)
+def test_a_law_fitted_to_loading_alone_does_not_predict_unloading(specimen, at_largest, unloading):
+    """As far off as Bandis' form: without plastic indentation the joint opens again."""
+    compliance = 42.8e-6 / 10.27e6
+    stress, closure, _ = read_closure(DATA / f"grimsel_{specimen}_closure.csv")
+    curve = jl.ClosureCurve(*first_loading(stress, closure), compliance=compliance)
+    test = read_flow(DATA / f"grimsel_flow_{specimen}.csv", CONDITIONS)
+    errors = fit_flow(test, jl.fit_curves([curve]).law, 5.3e6).errors["map of the law's closure"]
+    assert 100 * np.array(errors) == pytest.approx([at_largest, unloading], abs=0.6)
 
 
 # ---------------------------------------------------------------------------------- energy

@@ -31,7 +31,9 @@ examples:
 
 Quantities are typed with their unit: 10MPa, 2um, 30deg, 5GPa/m.
 """
-EXIT_FAILED_TEST, EXIT_INVALID_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_FAILED_TEST = 1
+EXIT_INVALID_INPUT = 2
+EXIT_INTERRUPTED = 130
 
 
 class Parser(argparse.ArgumentParser):

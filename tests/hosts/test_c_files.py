@@ -41,6 +41,7 @@ DEVICE = """
 typedef unsigned long size_t;
 extern "C" {
 __device__ double sqrt(double), fabs(double), expm1(double), log1p(double), pow(double, double);
+__device__ double exp(double), log(double);
 __device__ double hypot(double, double), fmin(double, double), fmax(double, double);
 __device__ double sin(double), cos(double), remainder(double, double);
 }

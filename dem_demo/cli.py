@@ -121,6 +121,10 @@ def _run(options: argparse.Namespace) -> None:
     with _messages_for(options.json):
         if options.command == "resume":
             sim = Simulation.load(options.state, options.step)
+            print(
+                "the run continues with the scene of its saved state: changes of the scene file "
+                "since then have no effect"
+            )
         else:
             sim = Simulation(load(options.scene))
         _describe(sim, options.until, options.format is not None)
@@ -248,6 +252,7 @@ def _check(options: argparse.Namespace) -> None:
     _describe(sim)
     if sim.verdict:
         _print_limit_analysis(sim.scene)
+        _check_stages(sim.scene)
     for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows_by_law, strict=True):
         stress = float(sim.joints.traction[rows, 0].max(initial=0.0))
         if isinstance(law, JointLaw):
@@ -255,6 +260,25 @@ def _check(options: argparse.Namespace) -> None:
             if law.bond and law.bond.cohesion and stress > 0.0:
                 _warn_of_bond(name, law, stress)
     print("the scene is valid")
+
+
+def _check_stages(scene: Scene) -> None:
+    """Print the verdict on the equilibrium after each excavation stage, and the unstable blocks.
+
+    Joints are taken without history, as if the stages were excavated before the loads act.
+    """
+    removed = [*scene.removed]
+    for number, stage in enumerate(scene.stages, 1):
+        removed += stage["blocks"]
+        print(f"after excavation stage {number}, on joints without history:")
+        excavated = replace(scene, stages=(), removed=tuple(removed))
+        try:
+            sim = Simulation(strength.settled(excavated))
+        except (SceneError, ValueError) as error:
+            print(f"not examined: {error}")
+            continue
+        _print_verdict(sim)
+        _print_limit_analysis(excavated)
 
 
 def _warn_of_closure_range(name: str, law: JointLaw, largest: float) -> None:

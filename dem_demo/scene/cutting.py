@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +85,22 @@ class Pieces(NamedTuple):
     edge_sets: list[np.ndarray]
     merged: int
     dropped: list[Polygon]
+
+
+def estimate_block_count(outline: np.ndarray, sets: Sequence[JointSet]) -> float:
+    """Estimate the number of blocks of a rock before it is cut; at least the number of joints.
+
+    Joints and their intersections, of which every one adds a block; an intersection adds one if
+    both joints are there (`persistence`).
+    """
+    area = Polygon(outline).area
+    joints = sum(float(np.ptp(outline @ one.normal)) / one.spacing for one in sets)
+    intersections = 0.0
+    for one, other in combinations(sets, 2):
+        sine = abs(float(one.normal[0] * other.normal[1] - one.normal[1] * other.normal[0]))
+        both = one.persistence * other.persistence
+        intersections += both * area * sine / one.spacing / other.spacing
+    return 1.0 + joints + intersections
 
 
 def cut(

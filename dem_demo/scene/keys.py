@@ -14,6 +14,7 @@ from shapely import Polygon
 from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
+MAX_FLATNESS = 1e-12  # width over length of a polygon whose corners lie on one line
 MAX_SEISMIC_COEFFICIENT = 2.0  # of the weight: no site has been shaken so strongly
 
 
@@ -53,9 +54,17 @@ def points(name: str, value: Any) -> list[tuple[float, float]]:
     return [vector(name, point) for point in LIST(name, value)]
 
 
+def _is_flat(ring: np.ndarray) -> bool:
+    """Whether corners (k, 2) lie on one line, but for rounding."""
+    sizes = np.linalg.svd(ring - ring.mean(axis=0), compute_uv=False)
+    return bool(sizes[1] <= MAX_FLATNESS * sizes[0])
+
+
 def corners(name: str, value: Any) -> np.ndarray:
     """Require the corners (k, 2) of a polygon that does not cross itself, in m."""
     ring = np.array(points(name, value))
+    if len(ring) >= 3 and _is_flat(ring):
+        raise ValueError(f"{name}: all corners lie on one line, so the area is zero")
     if len(ring) < 3 or not Polygon(ring).is_valid:
         raise ValueError(f"{name}: must be 3 corners [x, y] or more that do not cross or touch")
     return ring

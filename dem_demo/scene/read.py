@@ -13,7 +13,7 @@ from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
 from .blocks import LENGTH_TOLERANCE, Block, box, find_shape_error, median_width
-from .cutting import INWARD_CUT, JointSet, cut
+from .cutting import INWARD_CUT, JointSet, cut, estimate_block_count
 from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of
 from .laws import INTACT_ROCK, Files, build_law, intact_rock_law
@@ -32,6 +32,7 @@ CORNER_LENGTH_PER_WIDTH = 0.1  # of the narrowest block
 SOFT_PER_SKIN = 0.25  # of the skin of the narrowest block
 SLIVER_PER_WIDTH = 0.7  # of the median width: narrower blocks do not reduce the corner length
 INTACT_OPENING_PER_SKIN = 0.5  # opening at which intact rock breaks
+MAX_BLOCKS = 1e5  # of a scene: cutting and contact detection take hours beyond
 MIN_WIDTH_PER_SPACING = 0.2  # of the smallest spacing: narrower blocks of a rock are slivers
 
 
@@ -128,7 +129,9 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     water, in_situ = _stresses(top, blocks, where)
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
-        raise ValueError(f"{where}: two blocks have the same name; names must differ")
+        names = [block.name for block in blocks]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{where}: two blocks have the same name {twice!r}; names must differ")
     if all(block.fixed for block in blocks):
         raise ValueError(f"{where}: no block can move; give [[block]] or [[rock]], not all fixed")
     drives = read_drives(top["drive"], number, blocks, files, where)
@@ -339,6 +342,12 @@ def _rock(
     replaced_laws = table.get("laws", {})
     if unknown := set(replaced_laws) - {s.law for s in sets}:
         raise ValueError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
+    count = len(blocks) + estimate_block_count(table["outline"], sets)
+    if count > MAX_BLOCKS:
+        raise ValueError(
+            f"{where}: its sets cut about {count:.2g} blocks; must be at most {MAX_BLOCKS:.0e}: "
+            "give a larger spacing (m) or a smaller outline"
+        )
     shift = np.array(table.get("at", (0.0, 0.0)))
     extent = float(np.ptp(table["outline"], axis=0).min())
     spacing = min([extent, *(s.spacing for s in sets)])

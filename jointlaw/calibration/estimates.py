@@ -24,8 +24,9 @@ from ..laws.joint_law import JointLaw
 from ..support.checks import Array, one_of
 from .forward import build_law, log_stress
 from .measured import ShearCurve, simulate_curves
+from .noise import Series
 from .priors import TRANSFORMS, Values
-from .problem import Problem, Solution, central_differences
+from .problem import QUANTILE, Problem, Solution, central_differences
 from .shearing import SimulatedTest
 
 MAX_AUTOCORRELATED_MISFIT = 1.5  # of the expected noise: with more the shape of the law differs
@@ -36,6 +37,7 @@ UNBOUNDED_RATIO = 1e6  # upper over lower end of an interval that is reported as
 MIN_SOFTENING_POINTS = 3  # of one test, while a bond softens, to determine its cohesion
 BOUND_MARGIN = 1e-6  # of the distance of the bounds
 SMALL_VALUE = 0.01  # of the largest stress or opening: larger ones have logarithmic bands
+CURVE_QUANTITIES = ("stress", "opening")
 TRADE_OFF = ("mu", "a")  # friction and slopes, which shear stress alone cannot separate
 
 
@@ -44,8 +46,8 @@ class Estimates:
     """Result of a fit, in SI units.
 
     `free` names the free parameters in the order of `covariance`, `preload_closure` last;
-    `parameters` has all values; `noise`, `autocorrelated_misfit` and `shape_differs` have one entry
-    per series: closure curve, shear stress, opening.
+    `parameters` has all values; `autocorrelated_misfit` and `shape_differs` have one entry
+    per series of `series_names`: closure curve, shear stress, opening.
 
     problem: the problem that was solved.
     solution: its solution.
@@ -81,7 +83,7 @@ class Estimates:
         index = self.free.index(name)
         transform = TRANSFORMS[name]
         error = math.sqrt(self.solution.covariance[index, index])
-        half_width = self.solution.quantile * error + abs(self.discretisation_shift[index])
+        half_width = QUANTILE * error + abs(self.discretisation_shift[index])
         x = self.solution.x[index]
         low, high = self.problem.bounds()
         lower = max(x - half_width, low[index])
@@ -177,19 +179,40 @@ class Estimates:
         """Misfit that neighbouring points of each series have in common, relative as residuals.
 
         The root of the mean product of neighbouring residuals, 0 if it is negative. Independent
-        noise averages out; the misfit of a curve of another shape does not.
+        noise averages out; the misfit of a curve of another shape does not. The residuals are
+        those of the most probable parameters of each specimen: specimens that differ have the same
+        shape.
         """
-        residuals = self.problem.split(self.problem.data(self.solution.x))
-        return tuple(math.sqrt(max(float(np.mean(r[1:] * r[:-1])), 0.0)) for r in residuals)
+        residuals = self.problem.split(self.solution.specimen_residuals)
+        return tuple(
+            math.sqrt(max(float(np.mean(r[1:] * r[:-1])), 0.0))
+            for r, series in zip(residuals, self.problem.series, strict=True)
+            if series.quantity in CURVE_QUANTITIES
+        )
 
     @property
     def shape_differs(self) -> tuple[bool, ...]:
         """Whether each series has another shape than the curve of the law."""
-        pairs = zip(self.autocorrelated_misfit, self.problem.series, strict=True)
+        pairs = zip(self.autocorrelated_misfit, self._curve_series, strict=True)
         return tuple(
-            misfit > MAX_AUTOCORRELATED_MISFIT * series.expected.relative
+            misfit > MAX_AUTOCORRELATED_MISFIT * float(series.sigma().min())
             for misfit, series in pairs
         )
+
+    @property
+    def _curve_series(self) -> list[Series]:
+        """The series that are curves."""
+        return [one for one in self.problem.series if one.quantity in CURVE_QUANTITIES]
+
+    @property
+    def series_names(self) -> list[str]:
+        """Name of the test and of the quantity of each measured curve."""
+        return [
+            f"{curve.name}, {series.quantity}"
+            for curve in self.problem.curves
+            for series in curve.series
+            if series.quantity in CURVE_QUANTITIES
+        ]
 
     def predict(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) at closures (m) with the origin of the closure test."""
@@ -265,5 +288,5 @@ class Estimates:
         J = central_differences(lambda x: model(unpack(x)), self.solution.x, *bounds)
         variance = np.einsum("...p,pq,...q->...", J, self.solution.covariance, J)
         centre = model(self.parameters)
-        half_width = self.solution.quantile * np.sqrt(variance)
+        half_width = QUANTILE * np.sqrt(variance)
         return np.stack([centre - half_width, centre + half_width])

@@ -26,7 +26,7 @@ _PARAMETER_COLUMNS = (
     "parameter | value | 95 % interval | unit | prior share of variance | identifiable, given the "
     "fixed parameters"
 )
-_NOISE_COLUMNS = "curve | points | noise level | noise of the closure (um) | autocorrelated misfit"
+_NOISE_COLUMNS = "curve | points | noise level | autocorrelated misfit"
 _PEAK_COLUMNS = (
     "shear curve | largest stress (MPa), at (mm): measured | law | last (MPa) | law | "
     "opening at the end (mm) | law"
@@ -36,6 +36,10 @@ SHAPE_DIFFERS = (
     "the points, and not beyond them. A shear curve that falls after its peak needs a "
     "mating_length, cycles that lose dilation need slope_wear: free them too. Closure of mated "
     "joints may be closer to a hyperbola."
+)
+TOO_NARROW = (
+    "The data have another shape than the law (see below): the intervals assume that they have the "
+    "same, and are too narrow."
 )
 OVER_PARAMETERISED = (
     "The fit is over-parameterised. Fix {}: give known values (--set {}=VALUE), or leave them out "
@@ -59,6 +63,8 @@ class Fit(Estimates):
     def report(self) -> str:
         """The fit in words and tables (Markdown)."""
         lines = ["# Fit of the joint law", "", *self._parameter_table()]
+        if any(self.shape_differs):
+            lines += ["", f"**{TOO_NARROW}**"]
         lines += ["", FIXED.format(self._fixed_parameters())]
         reasons = self.not_identifiable
         if reasons:
@@ -75,7 +81,7 @@ class Fit(Estimates):
         if self.problem.shears:
             lines += self._peak_table()
         if any(self.shape_differs):
-            names = "; ".join(compress(self._series_names(), self.shape_differs))
+            names = "; ".join(compress(self.series_names, self.shape_differs))
             lines += ["", f"**{names} has another shape than the law.** {SHAPE_DIFFERS}"]
         return "\n".join(lines) + "\n"
 
@@ -99,28 +105,29 @@ class Fit(Estimates):
         fixed = [name for name in values if name not in excluded and np.isfinite(values[name])]
         return ", ".join(f"{name} = {values[name]:.4g}" for name in fixed)
 
-    def _series_names(self) -> list[str]:
-        """Name of the test and of the quantity of each series."""
-        return [
-            f"{curve.name}, {series.quantity}"
-            for curve in self.problem.curves
-            for series in curve.series
-        ]
-
     def _noise_table(self) -> list[str]:
         """Noise levels and autocorrelated misfit of each series."""
-        rows = (
-            f"{name} | {series.n_points} | {100 * noise.relative:.2g} % | "
-            f"{1e6 * noise.absolute:.2g} | {100 * misfit:.2g} %"
-            for name, series, noise, misfit in zip(
-                self._series_names(),
-                self.problem.series,
-                self.solution.noise,
-                self.autocorrelated_misfit,
-                strict=True,
-            )
+        rows = []
+        columns = (self.series_names, self._curve_series, self.autocorrelated_misfit)
+        for name, series, misfit in zip(*columns, strict=True):
+            sigma = series.sigma(self.solution.noise.mean.levels)
+            level = float(np.median(sigma))
+            rows.append(f"{name} | {sigma.size} | {100 * level:.2g} % | {100 * misfit:.2g} %")
+        return [*table(_NOISE_COLUMNS, rows), "", self._noise_sentence()]
+
+    def _noise_sentence(self) -> str:
+        """Autocorrelation of the residuals and spread between specimens."""
+        noise = self.solution.noise
+        parts = [f"{rho:.2g} ({test} tests)" for test, rho in noise.mean.autocorrelation.items()]
+        sentence = f"Autocorrelation of neighbouring residuals: {', '.join(parts)}. " * bool(parts)
+        if len(self.problem.curves) < 2:
+            return sentence + "The intervals are those of this specimen."
+        if not noise.has_specimens:
+            return sentence + "All tests are on one specimen; the intervals are those of it."
+        return sentence + (
+            "Spread between specimens, as standard deviation of each parameter: "
+            f"{100 * noise.mean.spread:.2g} %; it is part of the intervals."
         )
-        return table(_NOISE_COLUMNS, rows)
 
     def _peak_table(self) -> list[str]:
         """Peak, last stress and opening of each shear curve, measured and of the law."""
@@ -235,6 +242,7 @@ def fit_curves(
     fixed: Values | None = None,
     law: JointLaw | None = None,
     priors: Ranges | None = None,
+    one_specimen: bool = False,
 ) -> Fit:
     """Fit one law to one measured curve or to several together.
 
@@ -256,6 +264,8 @@ def fit_curves(
         at the peak.
     priors: 95 % ranges (low, high) in physical units that replace the defaults of `priors.PRIORS`;
         None drops one. Besides the parameters: "full_contact_stress".
+    one_specimen: True if all tests are on one specimen (multi-stage tests). By default every test
+        is on its own specimen, and the spread between specimens is part of the intervals.
 
     Returns a `Fit`. Raises ValueError naming the parameter for an invalid argument.
 
@@ -267,11 +277,11 @@ def fit_curves(
     >>> curve = jl.ShearCurve(sheared.shear, sheared.shear_stress, normal=5e6)
     >>> fit = jl.fit_curves([curve], free=["mu"], law=law)
     """
-    problem = build_problem(curves, free, fixed, law, priors)
+    problem = build_problem(curves, free, fixed, law, priors, one_specimen)
     problem = replace(problem, progress=iter(track(count(), "fit, laws tried")))
     starts = staged_starts(problem, starting_points(problem, has_law=law is not None))
+    solution = solve(problem, starts)
     for _ in range(MAX_REFINEMENTS):
-        solution = solve(problem, starts)
         steps = 2 * problem.settings.steps
         refined = replace(problem, settings=replace(problem.settings, steps=steps))
         change = refined.data(solution.x) - problem.data(solution.x)
@@ -279,7 +289,7 @@ def fit_curves(
         if discretisation_error < MAX_DISCRETISATION_ERROR:
             break
         problem = refined
-        starts = [solution.x]
+        solution = solve(problem, [], previous=solution)
     # the error decreases at least linearly with the step, so the remaining error is at most twice
     # the change
     shift = 2 * solution.gain @ change

@@ -13,7 +13,7 @@ from ..laws.joint_law import JointLaw
 from ..parameters.resolution import Resolution
 from ..support.checks import Array, at_least, finite, more_than, number
 from .forward import INITIAL_STEPS, Settings, build_law, log_stress
-from .noise import Noise, Series
+from .noise import Series
 from .priors import Values
 from .shearing import ShearPath, SimulatedTest, simulate_shear
 
@@ -131,7 +131,10 @@ class ClosureCurve:
         return closure - deformation
 
     def _make_series(self, stress: Array, closure: Array) -> Series:
-        """The measured stress, its expected noise and the slope of its logarithm."""
+        """The measured stress and its expected standard error, from stress and closure."""
+        if self.noise is not None:
+            sigma = np.full(stress.size, more_than("noise", self.noise, 0.0))
+            return Series("closure", "stress", {"normal stress": sigma}, is_known=True)
         slope = np.zeros(stress.size)
         ends = [0, *reversal_rows(stress)[1:-1], stress.size - 1]
         for start, end in reversed(list(pairwise(ends))):
@@ -139,9 +142,12 @@ class ClosureCurve:
             slope[branch] = _log_slope(closure[branch], stress[branch])
         # of the scaled stress, as in `residuals`
         scaled_slope = (stress / np.max(stress) if self.cycle else 1.0) * slope
-        default = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
-        expected = _expected_noise("noise", self.noise, default)
-        return Series("stress", expected, scaled_slope, scaled_slope.size)
+        closure_error = CLOSURE_NOISE * float(np.ptp(closure))
+        errors = {
+            "normal stress": np.full(stress.size, STRESS_NOISE),
+            "closure": closure_error * scaled_slope,
+        }
+        return Series("closure", "stress", errors)
 
     def residuals(self, values: Values, settings: Settings) -> Array:
         """ln(model/measured), (n,); over cycles (model - measured)/largest measured stress.
@@ -205,17 +211,25 @@ class ShearCurve:
             raise ValueError("shear_stress is zero throughout: there is no strength to fit")
         more_than("normal", np.min(self.normal), 0.0)
         number("azimuth", self.azimuth)
-        # the displacement is taken as exact; the last residual of the stress concerns the peak
-        n = self.shear.size
-        expected = _expected_noise("noise", self.noise, Noise(SHEAR_NOISE))
-        series = [Series("stress", expected, np.zeros(n + 1), n)]
-        if self.opening is not None:
-            if not self.opening.any():
-                raise ValueError("opening is zero throughout: leave it out if it was not measured")
-            default = Noise(OPENING_NOISE)
-            expected = _expected_noise("opening_noise", self.opening_noise, default)
-            series.append(Series("opening", expected, np.zeros(n), n))
-        object.__setattr__(self, "series", tuple(series))
+        if self.opening is not None and not self.opening.any():
+            raise ValueError("opening is zero throughout: leave it out if it was not measured")
+        object.__setattr__(self, "series", self._make_series())
+
+    def _make_series(self) -> tuple[Series, ...]:
+        """The measured quantities. The displacement is taken as exact."""
+        n = self.shear.size - self._first_row
+        stress = _shear_series("stress", "noise", self.noise, SHEAR_NOISE, n)
+        peak_error = {"peak position": stress.sigma()[:1]}
+        peak = Series("shear", "peak position", peak_error, is_known=True)
+        if self.opening is None:
+            return stress, peak
+        opening = _shear_series("opening", "opening_noise", self.opening_noise, OPENING_NOISE, n)
+        return stress, peak, opening
+
+    @property
+    def _first_row(self) -> int:
+        """First row with residuals. A row at zero displacement is zero by construction."""
+        return int(self.shear[0] == 0.0)
 
     def _columns(self) -> dict[str, Any]:
         """The measured columns by name."""
@@ -273,14 +287,16 @@ class ShearCurve:
         return test.stress[test.points], test.opening[test.points]
 
     def residuals(self, test: SimulatedTest) -> list[Array]:
-        """(model - measured)/largest measured, of shear stress (n + 1,) and opening (n,).
+        """(model - measured)/largest measured of shear stress, peak position and opening.
 
-        The last residual of the stress is the increase of the model above its stress at the
+        The residual of the peak position (1,) is the increase of the model above its stress at the
         measured peak, between the neighbouring points: with few points it is the only information
-        that the peak is there. Raises nothing.
+        that the peak is there. The others have one residual for each row, except a first row at
+        zero displacement. Raises nothing.
 
         test: the test by the law.
         """
+        measured_rows = slice(self._first_row, None)
         largest = np.max(np.abs(self.shear_stress))
         stress = test.stress
         rows = test.points
@@ -289,9 +305,10 @@ class ShearCurve:
         after = rows[min(peak + 1, rows.size - 1)]
         sense = np.sign(self.shear_stress[peak])
         increase = np.max(sense * (stress[before : after + 1] - stress[rows[peak]]))
-        residuals = [np.append(stress[rows] - self.shear_stress, increase) / largest]
+        difference = (stress[rows] - self.shear_stress)[measured_rows]
+        residuals = [difference / largest, np.array([increase / largest])]
         if self.opening is not None:
-            difference = test.opening[rows] - self.opening
+            difference = (test.opening[rows] - self.opening)[measured_rows]
             residuals.append(difference / np.max(np.abs(self.opening)))
         return residuals
 
@@ -315,9 +332,15 @@ class ShearCurve:
         return replace(self, **columns, notes=(*self.notes, note))
 
 
-def _expected_noise(name: str, known: float | None, default: Noise) -> Noise:
-    """The known noise, or the default to begin with."""
-    return default if known is None else Noise(more_than(name, known, 0.0), 0.0, True)
+def _shear_series(quantity: str, name: str, known: float | None, default: float, n: int) -> Series:
+    """A quantity of a shear test with n residuals of the known noise, or of the default.
+
+    name: of the argument with the known noise.
+    """
+    sigma = default if known is None else more_than(name, known, 0.0)
+    source = {"stress": "shear stress", "opening": "opening"}[quantity]
+    errors = {source: np.full(n, sigma)}
+    return Series("shear", quantity, errors, is_known=known is not None)
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array]:

@@ -7,9 +7,10 @@ A fit minimises
 over the free parameters x (mostly logarithms): r are the residuals of the data with standard errors
 sigma, the second sum are the priors. Three difficulties determine how this module works.
 
-**The noise is unknown.** The standard errors sigma follow from the residuals of the fit, and the
-fit depends on them. Both are estimated in turn until they are constant (`solve`). A restricted
-likelihood is used, because the parameters follow part of the noise (`noise.estimate_noise`).
+**The noise is unknown.** Level, autocorrelation and spread between specimens follow from the
+residuals of the fit, and the fit depends on them. The minimum above, with the expected sigma, is
+therefore only the beginning: `solve` then takes Gauss-Newton steps to the mean of the posterior
+that is averaged over the noise models (`noise`), until neither parameters nor noise change.
 
 **The misfit has several minima.** A mating length far from the true one makes the misfit flat,
 since the peak is then outside the measured range; and closure curves of narrow and of broad heights
@@ -31,7 +32,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
 from scipy.optimize import least_squares
 
 from ..laws.joint_law import JointLaw
@@ -41,12 +41,26 @@ from ..parameters.orientation import largest_c
 from ..support.checks import Array, number, one_of
 from .forward import Settings, build_law, log_stress, parameters_of_law
 from .measured import ClosureCurve, ShearCurve, simulate_curves
-from .noise import Noise, Series, estimate_noise
+from .noise import (
+    LinearTest,
+    NoiseEstimate,
+    Posterior,
+    Prior,
+    Series,
+    estimate_posterior,
+    misfit,
+    parameter_gain,
+    prior_estimate,
+    specimen_residuals,
+)
 from .priors import TRANSFORMS, Ranges, Values, normal_priors, quantity
 
 Curves = Sequence[ClosureCurve | ShearCurve]
-MAX_NOISE_ITERATIONS = 12
-NOISE_PRIOR_FREEDOM = 4.0  # degrees of freedom of the prior of the noise levels
+QUANTILE = 1.959964  # half-width of a 95 % interval in standard errors
+MAX_STEPS = 12  # to the mean of the posterior
+MAX_HALVINGS = 6  # of a step that increases the misfit
+STEP_TOLERANCE = 0.02  # of the standard error of a parameter
+LEVEL_TOLERANCE = 0.05  # of the logarithm of a noise level
 CLOSURE_PARAMETERS = (
     "alpha",
     "beta",
@@ -58,8 +72,9 @@ CLOSURE_PARAMETERS = (
 )
 # initial mating lengths over the largest shear displacement
 INITIAL_MATING_LENGTHS = (0.5, 0.15, 0.05, 0.015)
-FINAL_TOLERANCE = 1e-8  # change of the parameters and of the misfit at the end of a search
+START_TOLERANCE = 1e-5  # relative change of parameters and misfit, with the expected noise
 COARSE_TOLERANCE = 1e-3  # likewise, for initial values
+BOUND_MARGIN = 1e-9  # of the distance of the bounds: a fit stays away from them by this much
 DIFFERENCE_STEP = 1e-4  # of central differences, of a transformed parameter
 Function = Callable[[Array], Array]
 
@@ -74,6 +89,7 @@ class Problem:
     values: values of all parameters by name; of the free ones, initial values.
     priors: centre and standard deviation of each prior by name, after the transform.
     settings: fixed properties of the law.
+    one_specimen: whether all tests are on one specimen.
     progress: a progress bar that advances with each law tried, or None.
 
     A vector x (p,) has the free parameters after their transforms, mostly logarithms.
@@ -85,6 +101,7 @@ class Problem:
     values: Values
     priors: Mapping[str, tuple[float, float]]
     settings: Settings
+    one_specimen: bool = False
     progress: Iterator[object] | None = None
 
     @property
@@ -96,6 +113,16 @@ class Problem:
     def series(self) -> tuple[Series, ...]:
         """The measured quantities of all curves."""
         return tuple(series for curve in self.curves for series in curve.series)
+
+    @property
+    def has_specimens(self) -> bool:
+        """Whether the tests are on several specimens."""
+        return len(self.curves) > 1 and not self.one_specimen
+
+    @property
+    def varies(self) -> Array:
+        """Whether each free parameter is a logarithm that differs between specimens, (p,)."""
+        return np.array([TRANSFORMS[n].log and n != "preload_closure" for n in self.free])
 
     def unpack(self, x: Array) -> dict[str, float]:
         """All parameters in SI units from the vector of the free ones."""
@@ -170,16 +197,22 @@ class Problem:
 
     def split(self, residuals: Array) -> list[Array]:
         """An array with one number per residual of the data, divided by series."""
-        sizes = [series.log_slope.size for series in self.series]
+        sizes = [series.sigma().size for series in self.series]
         return np.split(residuals, np.cumsum(sizes)[:-1])
 
-    def sigma(self, noise: Sequence[Noise]) -> Array:
-        """Standard errors of all residuals with these noise levels of the series."""
-        errors = [
-            np.hypot(level.relative, level.absolute * series.log_slope)
-            for level, series in zip(noise, self.series, strict=True)
-        ]
-        return np.concatenate(errors)
+    @property
+    def expected_sigma(self) -> Array:
+        """Expected standard errors of all residuals."""
+        return np.concatenate([series.sigma() for series in self.series])
+
+    def by_test(self, residuals: Array, J: Array) -> list[LinearTest]:
+        """Residuals (n,) and their derivative (n, p), divided by test and series."""
+        pieces = iter(zip(self.split(residuals), self.split(J), strict=True))
+        tests = []
+        for curve in self.curves:
+            own = [next(pieces) for _ in curve.series]
+            tests.append(LinearTest(curve.series, [r for r, _ in own], [D for _, D in own]))
+        return tests
 
 
 def build_problem(
@@ -188,6 +221,7 @@ def build_problem(
     fixed: Values | None,
     law: JointLaw | None,
     priors: Ranges | None,
+    one_specimen: bool = False,
 ) -> Problem:
     """The problem of the arguments of `fit_curves`; raises ValueError as `fit_curves`."""
     closures = [curve for curve in curves if isinstance(curve, ClosureCurve)]
@@ -227,7 +261,7 @@ def build_problem(
     dropped = {} if "alpha" in values else {"full_contact_stress": None}
     chosen = normal_priors(tuple(free_names), {**dropped, **(priors or {})})
     closure = next(iter(closures), None)
-    return Problem(closure, shears, tuple(free_names), values, chosen, settings)
+    return Problem(closure, shears, tuple(free_names), values, chosen, settings, one_specimen)
 
 
 def _default_free(closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]) -> list[str]:
@@ -313,9 +347,8 @@ def staged_starts(problem: Problem, starts: list[Array]) -> list[Array]:
 
 def _best_values(problem: Problem, candidates: Sequence[dict[str, float]]) -> dict[str, float]:
     """The values of least misfit from several initial values, with the expected noise."""
-    sigma = problem.sigma([series.expected for series in problem.series])
     starts = [problem.pack(values) for values in candidates]
-    return problem.unpack(minimise(problem, sigma, starts, COARSE_TOLERANCE))
+    return problem.unpack(minimise(problem, starts, COARSE_TOLERANCE))
 
 
 # ------------------------------------------------------------------------- the solution
@@ -324,82 +357,142 @@ def _best_values(problem: Problem, candidates: Sequence[dict[str, float]]) -> di
 class Solution(NamedTuple):
     """Outcome of `solve`, for p parameters after their transforms.
 
-    x: (p,).
+    x: (p,), the mean of the posterior.
     information: (p, p) of the data, and of the bounds of the parameters.
     covariance: (p, p).
-    noise: noise levels of each series.
-    freedom: degrees of freedom from which the noise was estimated; infinite if it is known.
+    noise: noise levels, autocorrelation and spread between specimens.
     prior_share: (p,) share of the priors in the variance of each parameter.
     gain: (p, n) derivative of the parameters by the residuals.
+    specimen_residuals: (n,) residuals of the data without the differences between specimens.
     """
 
     x: Array
     information: Array
     covariance: Array
-    noise: tuple[Noise, ...]
-    freedom: float
+    noise: NoiseEstimate
     prior_share: Array
     gain: Array
-
-    @property
-    def quantile(self) -> float:
-        """Half-width of a 95 % interval in standard errors."""
-        if math.isinf(self.freedom):
-            return float(special.ndtri(0.975))
-        return float(special.stdtrit(self.freedom, 0.975))
+    specimen_residuals: Array
 
 
-def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
-    """The best of several starts, then parameters and noise levels in turn until convergence."""
-    low, high = problem.bounds()
-    noise = tuple(series.expected for series in problem.series)
-    sigma = problem.sigma(noise)
-    x = minimise(problem, sigma, starts)
-    for _ in range(MAX_NOISE_ITERATIONS):
-        r = problem.data(x)
-        J = central_differences(problem.data, x, low, high) / sigma[:, None]
-        J_prior = central_differences(problem.prior, x, low, high)
-        precision = J_prior.T @ J_prior
-        information = J.T @ J + np.diag((high - low) ** -2)
-        C = np.linalg.inv(information + precision)
-        leverage = np.einsum("ip,pq,iq->i", J, C, J)
-        previous = noise
-        pieces = zip(problem.series, problem.split(r), problem.split(leverage), strict=True)
-        noise = tuple(estimate_noise(*piece) for piece in pieces)
-        if noise == previous:
-            break
-        sigma = problem.sigma(noise)
-        x = minimise(problem, sigma, [x])
-    is_noise_known = all(level.is_known for level in noise)
-    residual_freedom = NOISE_PRIOR_FREEDOM + r.size - float(np.sum(leverage))
-    return Solution(
-        x=x,
-        information=information,
-        covariance=np.asarray(C, np.float64),
-        noise=noise,
-        freedom=np.inf if is_noise_known else residual_freedom,
-        prior_share=np.diag(C @ precision @ C) / np.diag(C),
-        gain=C @ (J / sigma[:, None]).T,
-    )
-
-
-def minimise(
-    problem: Problem, sigma: Array, starts: Sequence[Array], tolerance: float = FINAL_TOLERANCE
-) -> Array:
-    """The vector (p,) with the least sum of squares from several starts.
+def solve(problem: Problem, starts: Sequence[Array], previous: Solution | None = None) -> Solution:
+    """The mean and covariance of the posterior of the parameters.
 
     Parameters
     ----------
     problem: the problem.
-    sigma: standard errors of the residuals.
+    starts: initial vectors, of which the best is used.
+    previous: the solution of a similar problem to begin with, instead of `starts`.
+    """
+    if previous is None:
+        x = minimise(problem, starts, START_TOLERANCE)
+        noise = prior_estimate(problem.series, problem.has_specimens)
+    else:
+        x = previous.x
+        noise = previous.noise
+    low, high = problem.bounds()
+    margin = BOUND_MARGIN * (high - low)
+    for _ in range(MAX_STEPS):
+        x = np.clip(x, low + margin, high - margin)
+        tests, prior, prior_precision = _linearise(problem, x)
+        posterior = estimate_posterior(tests, prior, problem.varies, noise)
+        level_change = _level_change(noise, posterior.noise)
+        noise = posterior.noise
+        step = _step_within(x, posterior, low + margin, high - margin)
+        step = _decreasing_step(problem, x, step, tests, posterior)
+        x = x + step
+        is_small = np.abs(step) < STEP_TOLERANCE * np.sqrt(np.diag(posterior.covariance))
+        if is_small.all() and level_change < LEVEL_TOLERANCE:
+            break
+    C = posterior.conditional_covariance
+    return Solution(
+        x=x,
+        information=posterior.information - prior_precision,
+        covariance=posterior.covariance,
+        noise=noise,
+        prior_share=np.diag(C @ prior_precision @ C) / np.diag(posterior.covariance),
+        gain=parameter_gain(tests, C, posterior.mode, problem.varies),
+        specimen_residuals=specimen_residuals(tests, posterior.mode, problem.varies),
+    )
+
+
+def _linearise(problem: Problem, x: Array) -> tuple[list[LinearTest], Prior, Array]:
+    """The tests and the prior near x, and the information of the priors without the bounds."""
+    low, high = problem.bounds()
+    J = central_differences(problem.data, x, low, high)
+    tests = problem.by_test(problem.data(x), J)
+    J_prior = central_differences(problem.prior, x, low, high)
+    prior_precision = J_prior.T @ J_prior
+    information = prior_precision + np.diag((high - low) ** -2)
+    return tests, Prior(information, J_prior.T @ problem.prior(x)), prior_precision
+
+
+def _level_change(before: NoiseEstimate, after: NoiseEstimate) -> float:
+    """Largest change of the logarithm of a noise level."""
+    changes = [
+        abs(math.log(after.mean.levels[key] / level)) for key, level in before.mean.levels.items()
+    ]
+    return max(changes, default=0.0)
+
+
+def _step_within(x: Array, posterior: Posterior, low: Array, high: Array) -> Array:
+    """The step to the mean of the posterior, given that parameters stay within their bounds.
+
+    Parameters that would leave them stop there; the step of the others follows from the covariance.
+    """
+    step = posterior.step
+    C = posterior.covariance
+    stopped = np.zeros(x.size, bool)
+    while True:
+        leaves = ~stopped & ((x + step < low) | (x + step > high))
+        if not leaves.any():
+            return step
+        stopped |= leaves
+        target = np.clip(x + posterior.step, low, high) - x
+        excess = (target - posterior.step)[stopped]
+        C_stopped = C[np.ix_(stopped, stopped)]
+        step = posterior.step + C[:, stopped] @ np.linalg.solve(C_stopped, excess)
+        step[stopped] = target[stopped]
+
+
+def _decreasing_step(
+    problem: Problem, x: Array, step: Array, tests: Sequence[LinearTest], posterior: Posterior
+) -> Array:
+    """The step, halved until it does not increase the misfit of the most probable noise model."""
+
+    def objective(at: Array, residuals_at: Sequence[LinearTest]) -> float:
+        prior = problem.prior(at)
+        return misfit(residuals_at, posterior.mode, problem.varies) + float(prior @ prior)
+
+    J = np.concatenate([D for test in tests for D in test.derivatives])
+    before = objective(x, tests)
+    for _ in range(MAX_HALVINGS):
+        try:
+            moved = problem.by_test(problem.data(x + step), J)
+        except ValueError:  # no joint of these parameters can follow a test
+            step = step / 2
+            continue
+        # the mean of the posterior is not the minimum: an increase of one unit is admissible
+        if objective(x + step, moved) <= before + 1.0:
+            return step
+        step = step / 2
+    return np.zeros_like(step)
+
+
+def minimise(problem: Problem, starts: Sequence[Array], tolerance: float) -> Array:
+    """The vector (p,) with the least sum of squares from several starts, with the expected noise.
+
+    Parameters
+    ----------
+    problem: the problem.
     starts: initial vectors.
     tolerance: relative change of the vector and of the sum at the end.
     """
     low, high = problem.bounds()
-    margin = 1e-9 * (high - low)
+    margin = BOUND_MARGIN * (high - low)
     fits = [
         least_squares(
-            partial(problem.residuals, sigma=sigma),
+            partial(problem.residuals, sigma=problem.expected_sigma),
             np.clip(x, low + margin, high - margin),
             bounds=(low, high),
             method="dogbox",

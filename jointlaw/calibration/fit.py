@@ -13,7 +13,7 @@ from ..support.checks import Array
 from ..support.markdown import table
 from ..support.progress import track
 from ..support.pyplot import escape_math, pyplot, style, written
-from .estimates import Estimates
+from .estimates import CURVE_QUANTITIES, Estimates
 from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
@@ -285,7 +285,12 @@ def fit_curves(
         steps = 2 * problem.settings.steps
         refined = replace(problem, settings=replace(problem.settings, steps=steps))
         change = refined.data(solution.x) - problem.data(solution.x)
-        discretisation_error = float(np.max(np.abs(change)))
+        curve_changes = [
+            part
+            for part, series in zip(problem.split(change), problem.series, strict=True)
+            if series.quantity in CURVE_QUANTITIES
+        ]
+        discretisation_error = float(np.max(np.abs(np.concatenate(curve_changes))))
         if discretisation_error < MAX_DISCRETISATION_ERROR:
             break
         problem = refined

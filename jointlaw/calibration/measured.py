@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +30,10 @@ MIN_STRESS_DROP = 0.2  # of the stress at a peak: a smaller drop is scatter, not
 MIN_STRESS_DROP_OF_LARGEST = 0.02  # likewise, of the largest stress
 MAX_SLACK_STRESS = 0.002  # of the largest stress: rows with less are slack
 MIN_SHEAR_REVERSAL = 0.02  # of the largest shear displacement: a smaller reversal is scatter
+MIN_PEAK_DROP = 0.04  # of the peak stress, twice the noise: a curve that falls less has no peak
+PEAK_DISPLACEMENT_NOISE = 0.3  # of its logarithm: peaks are flat, and specimens differ
+MIN_PEAK_RATIO = 1e-3  # of displacements of the peak, of a model and measured
+MAX_ARC_BLOCKS = 100  # blocks of rows that are averaged to measure the length of a curve
 MIN_CLOSURE_POINTS = 4
 MIN_SHEAR_POINTS = 3
 _COLUMNS = ("shear", "shear_stress", "normal", "opening")
@@ -219,12 +223,15 @@ class ShearCurve:
         """The measured quantities. The displacement is taken as exact."""
         n = self.shear.size - self._first_row
         stress = _shear_series("stress", "noise", self.noise, SHEAR_NOISE, n)
-        peak_error = {"peak position": stress.sigma()[:1]}
-        peak = Series("shear", "peak position", peak_error, is_known=True)
-        if self.opening is None:
-            return stress, peak
-        opening = _shear_series("opening", "opening_noise", self.opening_noise, OPENING_NOISE, n)
-        return stress, peak, opening
+        series = [stress]
+        if self.peak is not None:
+            errors = {"peak displacement": np.array([self.peak.displacement_error])}
+            series.append(Series("shear", "peak displacement", errors, is_known=True))
+        if self.opening is not None:
+            series.append(
+                _shear_series("opening", "opening_noise", self.opening_noise, OPENING_NOISE, n)
+            )
+        return tuple(series)
 
     @property
     def _first_row(self) -> int:
@@ -242,6 +249,32 @@ class ShearCurve:
         first_sense = np.sign(self.shear[int(np.argmax(is_sheared))])
         rows = reversal_rows(first_sense * self.shear, 0.0, MIN_SHEAR_REVERSAL)
         return [*rows[:-1], self.shear.size - 1]
+
+    @cached_property
+    def peak(self) -> "Peak | None":
+        """The peak of the shear stress; None if the stress does not fall by 4 % after it."""
+        stress = np.abs(self.shear_stress)
+        row = int(np.argmax(stress))
+        ends = [end for end in self.reversals[1:] if end >= row]
+        begins = [begin for begin in self.reversals[:-1] if begin < row]
+        if not ends or not begins:
+            return None
+        begin = begins[-1]
+        end = ends[0]
+        is_high = stress > (1 - MIN_PEAK_DROP) * stress[row]
+        after = np.flatnonzero(~is_high[row : end + 1])
+        if after.size == 0:
+            return None
+        before = np.flatnonzero(~is_high[begin : row + 1])
+        first_high = begin + before[-1] + 1 if before.size else begin
+        last_high = row + after[0] - 1
+        distance = np.abs(self.shear - self.shear[begin])
+        if not distance[row] > 0:
+            return None
+        # the largest of many rows of a flat peak may be any of them
+        width = np.log(distance[last_high] / max(distance[first_high], distance[row] / 100))
+        error = float(np.hypot(PEAK_DISPLACEMENT_NOISE, 0.5 * width))
+        return Peak(row, begin, end, float(distance[row]), error)
 
     def path(self, steps: int) -> ShearPath:
         """The path to take a joint through: the measured points, and rows between them.
@@ -287,12 +320,13 @@ class ShearCurve:
         return test.stress[test.points], test.opening[test.points]
 
     def residuals(self, test: SimulatedTest) -> list[Array]:
-        """(model - measured)/largest measured of shear stress, peak position and opening.
+        """(model - measured)/largest measured of shear stress and opening, for each row.
 
-        The residual of the peak position (1,) is the increase of the model above its stress at the
-        measured peak, between the neighbouring points: with few points it is the only information
-        that the peak is there. The others have one residual for each row, except a first row at
-        zero displacement. Raises nothing.
+        A first row at zero displacement has no residual. The peak of the shear stress is compared
+        with the largest stress of the model between the same reversals, at whatever displacement,
+        because the stress about a peak depends little on the displacement, and the displacement of
+        a peak varies between specimens. The logarithm of the displacement over the measured one is
+        a residual of its own, (1,), between those of stress and opening. Raises nothing.
 
         test: the test by the law.
         """
@@ -300,36 +334,103 @@ class ShearCurve:
         largest = np.max(np.abs(self.shear_stress))
         stress = test.stress
         rows = test.points
-        peak = int(np.argmax(np.abs(self.shear_stress)))
-        before = rows[max(peak - 1, 0)]
-        after = rows[min(peak + 1, rows.size - 1)]
-        sense = np.sign(self.shear_stress[peak])
-        increase = np.max(sense * (stress[before : after + 1] - stress[rows[peak]]))
-        difference = (stress[rows] - self.shear_stress)[measured_rows]
-        residuals = [difference / largest, np.array([increase / largest])]
+        difference = stress[rows] - self.shear_stress
+        log_ratios = []
+        if self.peak is not None:
+            peak = self.peak
+            leg = slice(rows[peak.begin], rows[peak.end] + 1)
+            distance = np.abs(test.shear[leg] - test.shear[rows[peak.begin]])
+            sense = np.sign(self.shear_stress[peak.row])
+            displacement, maximum = _interpolated_maximum(distance, sense * stress[leg])
+            difference[peak.row] = sense * maximum - self.shear_stress[peak.row]
+            log_ratios.append(np.log(max(displacement / peak.displacement, MIN_PEAK_RATIO)))
+        residuals = [difference[measured_rows] / largest]
+        if self.peak is not None:
+            residuals.append(np.array(log_ratios))
         if self.opening is not None:
             difference = (test.opening[rows] - self.opening)[measured_rows]
             residuals.append(difference / np.max(np.abs(self.opening)))
         return residuals
 
-    def resampled(self, max_points: int) -> Self:
-        """This test with `max_points` points or a few more: evenly spaced rows, the peak, the
-        reversals and the end points.
+    def _arc_length(self) -> Array:
+        """Length (n,) along the curve, each column divided by its range.
 
-        Raises nothing.
+        Scatter of neighbouring rows is no length: it is averaged over blocks of rows.
+        """
+        columns = [self.shear, self.shear_stress]
+        if self.opening is not None:
+            columns.append(self.opening)
+        n = self.shear.size
+        edges = np.linspace(0, n, min(n, MAX_ARC_BLOCKS) + 1).round().astype(int)
+        # blocks between reversals only, so that these are not averaged away
+        edges = np.unique([*edges, *self.reversals[1:-1]])
+        middles = (edges[:-1] + edges[1:] - 1) / 2
+        squares = np.zeros(middles.size - 1)
+        for column in columns:
+            means = np.add.reduceat(column, edges[:-1]) / np.diff(edges)
+            squares += (np.diff(means) / max(float(np.ptp(column)), 1e-300)) ** 2
+        length = np.concatenate([[0.0], np.cumsum(np.sqrt(squares))])
+        # extended to the first and the last row at the slope of the neighbouring block
+        rows = np.arange(n)
+        inner = np.interp(rows, middles, length)
+        first = (length[1] - length[0]) / (middles[1] - middles[0])
+        last = (length[-1] - length[-2]) / (middles[-1] - middles[-2])
+        inner += first * np.minimum(rows - middles[0], 0.0)
+        inner += last * np.maximum(rows - middles[-1], 0.0)
+        return np.asarray(inner - inner[0])
+
+    def resampled(self, max_points: int) -> Self:
+        """This test with at most `max_points` points, and the peak, the reversals and end points.
+
+        The points are evenly spaced along the curve of shear stress against displacement (and of
+        opening), each divided by its range: a steep rise before the peak has as many points as the
+        displacement after it. Raises nothing.
         """
         n = self.shear.size
         if n <= max_points:
             return self
-        even = np.linspace(0, n - 1, max_points).round().astype(int)
+        length = self._arc_length()
+        stops = np.linspace(0.0, length[-1], max_points)
+        along = np.searchsorted(length, stops).clip(0, n - 1)
         peak = int(np.argmax(np.abs(self.shear_stress)))
-        rows = np.unique([*even, peak, *self.reversals])
+        rows = np.unique([*along, peak, *self.reversals])
         note = (
-            f"{rows.size} of {n} rows are fitted: evenly spaced rows, the peak, reversals and end "
-            "points"
+            f"{rows.size} of {n} rows are fitted: rows that are evenly spaced along the curve, the "
+            "peak, reversals and end points"
         )
         columns = {name: x[rows] for name, x in self._columns().items()}
         return replace(self, **columns, notes=(*self.notes, note))
+
+
+class Peak(NamedTuple):
+    """The peak of the shear stress of a measured test.
+
+    row: of the peak.
+    begin, end: rows of the reversals before and after it.
+    displacement: in m, from the reversal before it.
+    displacement_error: standard error of its logarithm.
+    """
+
+    row: int
+    begin: int
+    end: int
+    displacement: float
+    displacement_error: float
+
+
+def _interpolated_maximum(x: Array, y: Array) -> tuple[float, float]:
+    """Position and value of the maximum of points (n,), by a parabola through the three highest."""
+    top = int(np.argmax(y))
+    if top == 0 or top == y.size - 1:
+        return float(x[top]), float(y[top])
+    left, right = np.diff(x[top - 1 : top + 2])
+    if not (left > 0 and right > 0):
+        return float(x[top]), float(y[top])
+    rise, fall = np.diff(y[top - 1 : top + 2])
+    curvature = (fall / right - rise / left) / (left + right)
+    slope = rise / left + curvature * left
+    shift = -slope / (2 * curvature) if curvature < 0 else 0.0
+    return float(x[top] + shift), float(y[top] + 0.5 * slope * shift)
 
 
 def _shear_series(quantity: str, name: str, known: float | None, default: float, n: int) -> Series:

@@ -59,7 +59,9 @@ Curves = Sequence[ClosureCurve | ShearCurve]
 QUANTILE = 1.959964  # half-width of a 95 % interval in standard errors
 MAX_STEPS = 12  # to the mean of the posterior
 MAX_HALVINGS = 6  # of a step that increases the misfit
-STEP_TOLERANCE = 0.02  # of the standard error of a parameter
+STEP_TOLERANCE = 0.1  # of the standard error of a parameter: it widens an interval by 0.5 %
+FULL_STEPS = 4  # later steps are reduced, because they oscillate about the mean
+STEP_REDUCTION = 0.6
 LEVEL_TOLERANCE = 0.05  # of the logarithm of a noise level
 CLOSURE_PARAMETERS = (
     "alpha",
@@ -392,13 +394,15 @@ def solve(problem: Problem, starts: Sequence[Array], previous: Solution | None =
         noise = previous.noise
     low, high = problem.bounds()
     margin = BOUND_MARGIN * (high - low)
-    for _ in range(MAX_STEPS):
+    for iteration in range(MAX_STEPS):
         x = np.clip(x, low + margin, high - margin)
         tests, prior, prior_precision = _linearise(problem, x)
         posterior = estimate_posterior(tests, prior, problem.varies, noise)
         level_change = _level_change(noise, posterior.noise)
         noise = posterior.noise
         step = _step_within(x, posterior, low + margin, high - margin)
+        if iteration >= FULL_STEPS:
+            step = STEP_REDUCTION * step
         step = _decreasing_step(problem, x, step, tests, posterior)
         x = x + step
         is_small = np.abs(step) < STEP_TOLERANCE * np.sqrt(np.diag(posterior.covariance))

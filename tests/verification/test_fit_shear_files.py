@@ -14,6 +14,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw import ClosureCurve, ShearCurve
+from jointlaw.calibration.shearing import simulate_shear
 from jointlaw.cli.main import main
 
 SHEAR = np.linspace(0, 3e-5, 12)
@@ -101,6 +102,49 @@ def test_constant_normal_stiffness_is_fitted_with_the_measured_normal_stress(law
     assert opening == pytest.approx((record.closure[0] - record.closure)[rows], abs=1e-7)
     fit = jl.fit_curves([curve], law=replace(law, orientation=jl.Orientation(2.6, 0.3)), free="a")
     assert fit.parameters["a"] == pytest.approx(3.0, rel=0.01)
+
+
+def test_peak_is_compared_at_any_displacement(law):
+    """Three points with the peak at twice the displacement of the law's: the stress is exact."""
+    law = replace(law, mating_length=2e-4, plane=0.0)
+    shear = np.linspace(0.0, 1e-3, 400)
+    stress, _ = ShearCurve(shear, np.ones(400), 3e6).predict(law, STEPS)
+    top = int(np.argmax(stress))
+    points = [0.0, 2 * shear[top], 1e-3]
+    curve = ShearCurve(points, [0.0, stress[top], stress[-1]], 3e6)
+    (test,) = simulate_shear(law, [curve.path(STEPS)])
+    of_stress, log_displacement = curve.residuals(test)
+    # 1e-3: the steps of this path and of the dense one
+    np.testing.assert_allclose(of_stress, 0.0, atol=1e-3)
+    # the row of the maximum is known to a step of 2.5 um
+    assert log_displacement == pytest.approx(-np.log(2.0), abs=0.1)
+
+
+def test_peak_of_a_test():
+    """A plateau has no peak; a flat peak has an uncertain displacement; one after a reversal."""
+    shear = np.linspace(0.0, 1e-2, 101)
+    assert ShearCurve(shear, np.minimum(shear, 1e-3), 1e6).peak is None
+    sharp = ShearCurve(shear, np.where(shear > 1.05e-3, 0.7, shear / 1e-3), 1e6).peak
+    flat = ShearCurve(shear, np.where(shear > 6e-3, 0.7, np.minimum(1.0, shear / 1e-3)), 1e6).peak
+    assert sharp.displacement == pytest.approx(1e-3)
+    assert sharp.displacement_error == pytest.approx(0.3, abs=0.01)
+    assert flat.displacement_error > 0.8
+    back = np.concatenate([shear[:21], shear[19::-1]])
+    stress = np.concatenate([np.linspace(0, 1, 21), np.linspace(0, -2, 11), np.full(9, -1.5)])
+    reversed_peak = ShearCurve(back, stress, 1e6).peak
+    assert (reversed_peak.row, reversed_peak.begin, reversed_peak.end) == (31, 20, 40)
+    assert reversed_peak.displacement == pytest.approx(1.1e-3)
+
+
+def test_resampled_rows_are_evenly_spaced_along_the_curve():
+    """1001 noisy rows with a peak at 0.5 mm of 10 mm: even rows would leave three before it."""
+    shear = np.linspace(0.0, 1e-2, 1001)
+    stress = np.where(shear < 5e-4, shear / 5e-4, 0.7 + 0.3 * np.exp(-(shear - 5e-4) / 2e-3))
+    stress += 0.01 * np.random.default_rng(0).standard_normal(1001)
+    curve = ShearCurve(shear, stress, 1e6).resampled(60)
+    assert curve.shear.size <= 62
+    assert np.sum(curve.shear < 5e-4) >= 15
+    assert np.max(np.diff(curve.shear)) < 1e-3
 
 
 def test_resampled_record_keeps_peak_reversals_and_end_points():
@@ -231,7 +275,7 @@ def test_saved_law_has_the_fitted_peaks(tmp_path, capsys):
     """In steps of 10 um. The saved law has fewer nodes than the law of the fit: an error of 3 %.
     The measured peaks are within 6 %, including the tests at 2 and 4 MPa, which were not fitted;
     the residual stresses at 10 mm are within 4 %, the displacements of the flat peaks within a
-    third.
+    factor of 2.
     """
     for normal, (peak, peak_shear, residual) in MEASURED.items():
         points = ((0, 0), (peak_shear, peak), (10, residual))
@@ -261,7 +305,7 @@ def test_saved_law_has_the_fitted_peaks(tmp_path, capsys):
             assert stress[top] == pytest.approx(float(reported[1][0]), rel=0.03)
         assert stress[top] == pytest.approx(peak, rel=0.06)
         assert stress[-1] == pytest.approx(residual, rel=0.04)
-        assert record.shear[top] == pytest.approx(1e-3 * peak_shear, rel=1 / 3)
+        assert 0.5 < record.shear[top] / (1e-3 * peak_shear) < 2
 
 
 @pytest.mark.slow

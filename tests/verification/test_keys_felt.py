@@ -112,6 +112,7 @@ def drive(**keys):
 PROBES = {  # path of the key: scene, where the key is in it, another value
     "title": (BLOCKS, "title", "others"),
     "gravity": (BLOCKS, "gravity", [1.0, -9.0]),
+    "seismic": (BLOCKS, "seismic", [0.1, 0.0]),
     "density": (BLOCKS, "density", 2500.0),
     "thickness": (BLOCKS, "thickness", 2.0),
     "law": (BLOCKS, "law", "strong"),

@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw import JointLaw, PathError, __version__, direct_shear
+from jointlaw import JointLaw, PathError, direct_shear
 from jointlaw.cli.command import Command, Option, option
 from jointlaw.cli.main import EXIT_INTERRUPTED, EXIT_INVALID_INPUT, Parser
 from jointlaw.support.files import SUMMARY, write_json
 from jointlaw.support.pyplot import FORMATS
+from jointlaw.support.version import __version__
 
 from .dynamics.relaxation import MAX_ITERATIONS, Verdict
 from .dynamics.simulation import Simulation

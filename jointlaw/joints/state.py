@@ -28,7 +28,7 @@ class JointState:
         return len(self.values)
 
     def require(self, fingerprint: str) -> None:
-        """Raise ValueError if the law of this fingerprint did not write the state."""
+        """Check that the law of this fingerprint wrote the state; raises ValueError if not."""
         if self.fingerprint == fingerprint:
             return
         own_version = self.fingerprint.partition(":")[0]
@@ -42,7 +42,7 @@ class JointState:
         raise ValueError("state belongs to a joint law with other parameters")
 
     def save(self, path: str | Path) -> None:
-        """Write the state to an NPZ file, atomically."""
+        """Write the state to an NPZ file at `path`, atomically. Raises OSError where it cannot."""
         buffer = io.BytesIO()
         np.savez(buffer, version=_VERSION, fingerprint=self.fingerprint, values=self.values.T)
         replace_file(Path(path), buffer.getvalue())
@@ -61,7 +61,7 @@ class NonFiniteError(FloatingPointError, ValueError):
 
 
 def load_state(path: str | Path) -> JointState:
-    """Read a state that `JointState.save` wrote. Raises ValueError for any other file.
+    """Read a state that `JointState.save` wrote to `path`. Raises ValueError for any other file.
 
     >>> joint.snapshot().save("joint.npz")
     >>> joint.restore(jl.load_state("joint.npz"))

@@ -10,7 +10,10 @@ from ..support.checks import Array
 
 
 class ElementResponse(NamedTuple):
-    """Contribution of an element to a step of B joints."""
+    """Contribution of an element to a step of B joints.
+
+    F: traction; dissipated: energy; C: tangent, None unless requested.
+    """
 
     F: Array  # traction (dim, B) in Pa
     dissipated: Array  # (B,) in J/m2, >= 0
@@ -67,10 +70,12 @@ class Element(ABC):
 
     @abstractmethod
     def stiffness(self, delta: Array, state: Array) -> Array:
-        """Upper bound (B,) of its part of `|C|` in Pa/m, for joints in these states."""
+        """Upper bound (B,) of its part of `|C|` in Pa/m, for joints at displacements `delta`
+        (dim, B) in m with rows of `state`."""
 
     def traction(self, delta: Array, state: Array) -> Array:
-        """Traction (dim, B) in Pa of a state, from a zero increment."""
+        """Traction (dim, B) in Pa of a `state` at displacements `delta` (dim, B), from a zero
+        increment."""
         return self.step(delta, np.zeros_like(delta), state, np.empty_like(state), False).F
 
     def normal_stress(self, closure: Array) -> Array:
@@ -111,11 +116,14 @@ class Element(ABC):
         return bound * max(1.0, reduction**-2)
 
     def stored_energy(self, delta: Array, state: Array) -> Array:
-        """Elastic energy (B,) in J/m2."""
+        """Elastic energy (B,) in J/m2 of a `state` at displacements `delta` (dim, B) in m."""
         return self.measures(delta, state).stored_energy
 
     def measures(self, delta: Array, state: Array) -> Measures:
-        """Measures (B,); needed only if the element is the first one of a law."""
+        """Measures (B,) of a `state` at displacements `delta` (dim, B) in m.
+
+        Needed only if the element is the first one of a law. Raises NotImplementedError otherwise.
+        """
         raise NotImplementedError(
             f"{type(self).__name__} has no measures: put it after the first element of the law"
         )

@@ -99,14 +99,17 @@ class CoulombLaw(Law, kind="coulomb"):
         return LawTables(dim, (CoulombElement(self, dim),))
 
     def secant_stiffness(self, normal_stress: float) -> tuple[float, float]:
-        """As `Law.secant_stiffness`: the two parameters."""
+        """As `Law.secant_stiffness`: the two parameters, at any normal_stress.
+
+        Raises ValueError for a stress that is not positive.
+        """
         if len(self.tables.elements) > 1:
             return super().secant_stiffness(normal_stress)
         more_than("normal_stress", normal_stress, 0.0)
         return self.normal_stiffness, self.shear_stiffness if self.dim > 1 else 0.0
 
     def first_loading_stiffness(self, closure: ArrayLike, reduction: float = 1.0) -> Any:
-        """As `Law.first_loading_stiffness`.
+        """As `Law.first_loading_stiffness`, at a closure in a reduction; raises the same errors.
 
         `max_stiffness` has the friction in it, for the coupling of shear to closure, which has no
         eigenvalue of its own: the eigenvalues of (kn, 0; mu kn, 0) are kn and 0.

@@ -165,7 +165,7 @@ class JointLaw(Law, kind="joint"):
         return (self.asperity_density * fraction * density)[()]
 
     def contact_fraction(self, closure: float) -> float:
-        """As `Law.contact_fraction`."""
+        """As `Law.contact_fraction`, at a closure (m). Raises ValueError as `contacts` does."""
         if self.heights is None:
             return 0.0
         return float(self.contacts(closure) / self.asperity_density)

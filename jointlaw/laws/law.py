@@ -78,7 +78,7 @@ class Law:
         """A batch of n joints of this law, advanced together; they start as `joint` does.
 
         track_dissipation: as of `JointBatch`; normal_stress: one for all or (n,), in Pa; mated: for
-        all or (n,).
+        all or (n,). Raises ValueError as `joint` does.
         """
         batch = JointBatch(self, n, track_dissipation)
         is_unmated = ~booleans("mated", mated, n)
@@ -160,7 +160,8 @@ class Law:
         """Normal stress (Pa) on the first-loading curve, at a closure (m) without shear.
 
         If asperities yield it is the limit of many cells; the few cells of a joint slip a little
-        later. A bond or tensile strength makes it negative for an opening.
+        later. A bond or tensile strength makes it negative for an opening. Raises ValueError for a
+        closure beyond `max_effective_closure`, where forces overflow.
         """
         return self._first_loading(self._require_finite_forces_at(closure))[()]
 
@@ -178,7 +179,8 @@ class Law:
     def contact_fraction(self, closure: float) -> float:
         """Fraction of the asperities in contact at this closure (m); 0 for a law without heights.
 
-        The law is not valid where nearly all asperities are in contact (docs/limits.md).
+        The law is not valid where nearly all asperities are in contact (docs/limits.md). A law
+        with heights raises ValueError for a closure that is not finite.
         """
         return 0.0
 
@@ -256,7 +258,8 @@ class Law:
 
         shear: largest distance from the interlocked position, in any direction. Plastic
         indentation, degradation and damage decrease the stiffness. The softening of a bond or of
-        Coulomb's joint has a negative slope, whose size may exceed this bound.
+        Coulomb's joint has a negative slope, whose size may exceed this bound. Raises ValueError
+        for a negative shear, and as `normal_stress` does.
         """
         y = self._require_finite_forces_at(closure)
         distance = finite("shear", shear, "m")
@@ -281,7 +284,8 @@ class Law:
 
         A fraction of 0.95 is stable in lasting contact, and where friction dissipates energy in
         every impact. Impacts without dissipation need 0.2 or less, because they last only
-        2/fraction steps (docs/limits.md).
+        2/fraction steps (docs/limits.md). Raises ValueError as `max_stiffness`
+        does.
         """
         return stable_time_step(mass, area, self.max_stiffness(closure, shear))[()]
 
@@ -333,7 +337,8 @@ class Law:
     def from_toml(cls, path: str | Path) -> Self:
         """A law from a TOML file; the keys are the parameters.
 
-        The key `kind` of the file names the class: "joint", the default, or "coulomb".
+        The key `kind` of the file at `path` names the class: "joint", the default, or "coulomb".
+        Raises ValueError for a missing file, text that is not TOML, and parameters out of bounds.
         """
         if "\n" in str(path):
             raise ValueError("this is TOML text, not the path of a law file: use from_text")
@@ -341,12 +346,15 @@ class Law:
 
     @classmethod
     def from_text(cls, text: str) -> Self:
-        """A law from TOML text, as `to_toml` returns it."""
+        """A law from TOML `text`, as `to_toml` returns it. Raises ValueError as `from_toml`."""
         return cls.from_dict(keys.parse(text, "TOML text"), "TOML text")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "law") -> Self:
-        """A law from the mapping of such a file; `where` names it in error messages."""
+        """A law from the mapping `data` of such a file; `where` names it in error messages.
+
+        Raises ValueError as `from_toml`.
+        """
         law: Self = toml.law_of(Law.kinds, data, where)
         return law
 

@@ -88,7 +88,7 @@ def parameters_of(kind: Any) -> dict[str, Parameter]:
 
 
 def declared(kind: type[T]) -> type[T]:
-    """Add the list of its parameters to the docstring of a dataclass: a decorator."""
+    """Add the list of its parameters to the docstring of a dataclass `kind`: a decorator."""
     lines = []
     for name, declaration in parameters_of(kind).items():
         limits = "; ".join(text for text in (declaration.unit, declaration.bounds) if text)

@@ -107,7 +107,7 @@ class LawTables:
         return max(element.closure_per_displacement for element in self.elements)
 
     def element_rows(self, *states: Array) -> Iterator[tuple[Element, list[Array]]]:
-        """Yield every element with its rows of these states, as views."""
+        """Yield every element with its rows of these `states` (rows, B), as views."""
         first = self.dim + 1
         for element in self.elements:
             end = first + sum(element.rows.values())

@@ -77,7 +77,8 @@ PARTS = {
     "angle-sum": Part("docs/measure/random_laws.py angle-sum", quoted_in="limits.md"),
     "energy-gain": Part("docs/measure/energy_gain.py", quoted_in="limits.md theory-incremental.md"),
     "energy-gain-of-one-law": Part(
-        "docs/measure/energy_gain.py --laws 1 --first 1138", quoted_in="limits.md"
+        "docs/measure/energy_gain.py --laws 1 --first 1138 --generations 150 --population 20",
+        quoted_in="limits.md",
     ),
     # blocks.md
     "shaken-slab": Part("docs/measure/blocks.py shaken-slab", quoted_in="blocks.md"),

@@ -1,6 +1,6 @@
 """The largest energy that steps and closed cycles with a mating length gain: a search.
 
-    python docs/measure/energy_gain.py [--laws 60] [--first 0]
+    python docs/measure/energy_gain.py [--laws 60] [--first 0] [--generations 25] [--population 4]
 
 In the limit of small steps no step gains energy by the work of the joint's own traction, nor does a
 closed cycle. Differential evolution looks for the opposite on random laws: for the step, the step
@@ -9,7 +9,8 @@ gain most. Traction is integrated along each step by a Gauss rule. A gain is the
 the end, less the work and the energy stored at the start, over the largest energy stored on the
 way. Printed are the largest of all laws, by steps of at most so many mating lengths; of the cycles
 also in steps of a tenth, and of the triangle the largest error of the work if it is taken as the
-trapezoid of the tractions at the ends of steps.
+trapezoid of the tractions at the ends of steps. More generations and a larger population (of
+candidates for each parameter) find larger gains.
 """
 
 from typing import NamedTuple
@@ -37,21 +38,26 @@ FORWARD_AND_BACK = Path(free_corners=1, steps_per_leg=1, rounds=4)
 TRIANGLE = Path(free_corners=2, steps_per_leg=8, rounds=1)
 
 
-def largest_gains(laws=60, first=0):
+def largest_gains(laws=60, first=0, generations=25, population=4):
     """Search the random laws of so many seeds from the first on, and print the table."""
+    effort = {"maxiter": generations, "popsize": population}
     rows = []
     for step_size in STEP_SIZES:
-        gains = [gains_of_law(step_size, first + i) for i in range(laws)]
+        gains = [gains_of_law(step_size, first + i, effort) for i in range(laws)]
         rows.append([f"{step_size:g}", *(f"{gain:.1e}" for gain in np.max(gains, axis=0))])
     print_table(["step (mating lengths)", "one step", "there and back", "in tenths", "triangle",
                  "in tenths", "trapezoid", "in tenths"], rows)  # fmt: skip
 
 
-def gains_of_law(step_size, seed):
-    """The figures (7,) of one law: gains, and errors of the trapezoid."""
+def gains_of_law(step_size, seed, effort):
+    """The figures (7,) of one law: gains, and errors of the trapezoid.
+
+    effort: options of the differential evolution.
+    """
     law = random_law(np.random.default_rng(seed))
     step, round_trip, triangle = (
-        search(law, step_size, path, seed) for path in (SINGLE_STEP, FORWARD_AND_BACK, TRIANGLE)
+        search(law, step_size, path, seed, effort)
+        for path in (SINGLE_STEP, FORWARD_AND_BACK, TRIANGLE)
     )
     step_gain = energy_gains(law, step, steps=1, panels=2048)[0, 0]
     round_gains = [
@@ -84,7 +90,7 @@ def random_law(rng):
     )  # fmt: skip
 
 
-def search(law, step_size, path, seed):
+def search(law, step_size, path, seed, effort):
     """Corners (1, legs, dim) of the path of the largest gain that differential evolution finds."""
     panels = 2 if path == TRIANGLE else 32
     parameters = 1 + (2 + path.free_corners) * law.dim
@@ -94,8 +100,8 @@ def search(law, step_size, path, seed):
         return -energy_gains(law, corners, path.steps_per_leg, panels)[:, 0]
 
     result = differential_evolution(
-        loss, [(-1.0, 1.0)] * parameters, maxiter=25, popsize=4,
-        polish=False, vectorized=True, updating="deferred", rng=np.random.default_rng(seed),
+        loss, [(-1.0, 1.0)] * parameters, polish=False, vectorized=True, updating="deferred",
+        rng=np.random.default_rng(seed), **effort,
     )  # fmt: skip
     return path_corners(law, result.x[:, None], step_size, path)
 

@@ -68,6 +68,7 @@ PARTS = {
     "empirical-laws": Part("docs/measure/fits.py empirical-laws", page="validation.md"),
     "extrapolation": Part("docs/measure/fits.py extrapolation", page="validation.md"),
     "intervals": Part("docs/measure/fits.py intervals", page="validation.md"),
+    "coverage": Part("docs/measure/coverage.py", quoted_in="../CHANGELOG.md"),
     "peak-residual": Part("docs/measure/fits.py peak-and-residual", page="validation.md"),
     "extremes": Part("docs/measure/test_figures.py extremes", quoted_in="validation.md"),
     "exact-steps": Part("docs/measure/test_figures.py exact-steps", quoted_in="validation.md"),

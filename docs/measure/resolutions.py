@@ -107,13 +107,12 @@ def plane_error(law, azimuth):
     spatial_joint = law.joint()
     planar_joint = replace(law, plane=azimuth).joint()
     stresses = []
-    for step in range(300):  # close, shear forward, shear back
-        if step == 0:
-            closure_step, shear_step = 5e-7, 0.0
-        else:
-            closure_step, shear_step = 0.0, 1e-8 if step < 150 else -1e-8
-        F, _ = spatial_joint.update([closure_step, *(shear_step * along)], tangent=False)
-        G, _ = planar_joint.update([closure_step, shear_step], tangent=False)
+    close = [[5e-7, 0.0]]
+    shear_forward = [[0.0, 1e-8]] * 149
+    shear_back = [[0.0, -1e-8]] * 150
+    for closing, shearing in close + shear_forward + shear_back:
+        F, _ = spatial_joint.update([closing, *(shearing * along)], tangent=False)
+        G, _ = planar_joint.update([closing, shearing], tangent=False)
         stresses.append([F[1:] @ along, G[1], F[1:] @ across])
     spatial, planar, shear_across = np.array(stresses).T
     peak = np.abs(spatial).max()

@@ -1,7 +1,8 @@
 """Build backend: setuptools, after the libraries of the compiled law and of the block demo.
 
-Where no C compiler of this machine works, the package `ziglang` is asked for, which is one. A wheel
-with the library fits every Python of its platform; without one it fits every platform.
+If no C compiler of this machine works, the build requires the package `ziglang`, which contains
+one. A wheel with libraries fits every Python of its platform; a wheel without them fits every
+platform.
 """
 
 import importlib
@@ -17,10 +18,10 @@ from setuptools import build_meta
 from setuptools.build_meta import *  # noqa: F403
 
 ROOT = Path(__file__).parents[1]
-TARGET = "JOINTLAW_TARGET"  # a wheel for another machine: one of build.TARGETS
+TARGET = "JOINTLAW_TARGET"  # environment variable: build a wheel for one of build.TARGETS
 
 
-# The builders without the __init__.py of their packages, whose imports need numpy
+# Import the builders without the __init__.py of their packages, which need numpy
 for name in ("jointlaw", "dem_demo"):
     package = sys.modules[name] = ModuleType(name)
     package.__path__ = [str(ROOT / name)]
@@ -29,10 +30,12 @@ demo_build = importlib.import_module("dem_demo.native.build")
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
-    """What setuptools asks for, and a compiler where there is none."""
-    needed = build_meta.get_requires_for_build_wheel(config_settings)
-    own = not os.environ.get(TARGET) and any(map(build.works, build.compilers_on_path()))
-    return needed if own else [*needed, "ziglang"]
+    """Requirements of setuptools, and a compiler if this machine has none."""
+    requirements = build_meta.get_requires_for_build_wheel(config_settings)
+    builds_for_itself = not os.environ.get(TARGET)
+    if builds_for_itself and any(map(build.works, build.compilers_on_path())):
+        return requirements
+    return [*requirements, "ziglang"]
 
 
 get_requires_for_build_editable = get_requires_for_build_wheel
@@ -49,7 +52,7 @@ def _build_libraries() -> bool:
     target = os.environ.get(TARGET)
     compiler = build.zig(target) if target else build.find_compiler()
     if compiler is None:
-        print("no C compiler works here: numpy's kernel remains", file=sys.stderr)
+        print("no C compiler works here: the law will run in numpy", file=sys.stderr)
         return False
     for builder in (build, demo_build):
         print(builder.build(compiler), "by", *compiler.command, file=sys.stderr)
@@ -59,8 +62,8 @@ def _build_libraries() -> bool:
 def build_wheel(
     wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None
 ) -> str:
-    """A wheel py3-none-PLATFORM."""
-    # setuptools would add what an earlier build left there
+    """Build a wheel py3-none-PLATFORM."""
+    # setuptools would include files of an earlier build
     shutil.rmtree(ROOT / "build", ignore_errors=True)
     settings = dict(config_settings or {})
     if _build_libraries():
@@ -74,6 +77,6 @@ def build_wheel(
 def build_editable(
     wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None
 ) -> str:
-    """An editable install, with the library beside its sources."""
+    """Build an editable install, with the libraries in the folders of their sources."""
     _build_libraries()
     return build_meta.build_editable(wheel_directory, config_settings, metadata_directory)

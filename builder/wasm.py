@@ -1,7 +1,7 @@
-"""The law in WebAssembly, for `jointlaw browser`: `python builder/wasm.py [FILE]` makes it anew.
+"""Rebuild the law in WebAssembly, for `jointlaw browser`: `python builder/wasm.py [FILE]`.
 
-After a change of the law's C files or of joint.c, with the extra `docs` installed, whose package
-`ziglang` compiles it: the same version gives the same bytes on every machine.
+Run it after a change of the C files of the law or of joint.c. It needs the extra `docs`, whose
+package `ziglang` is the compiler: the same version produces the same bytes on every machine.
 """
 
 import subprocess
@@ -20,5 +20,5 @@ if any(word.startswith("-") for word in sys.argv[1:]):
 with tempfile.TemporaryDirectory() as headers:
     backend.build.write_headers(Path(headers))
     flags = [*FLAGS, *(flag for flag in backend.build.FLAGS if flag != "-O3"), f"-I{headers}"]
-    made = sys.argv[1] if len(sys.argv) > 1 else HERE / "joint.wasm"
-    sys.exit(subprocess.run([*ZIG, *flags, HERE / "joint.c", "-o", made]).returncode)
+    wasm = sys.argv[1] if len(sys.argv) > 1 else HERE / "joint.wasm"
+    sys.exit(subprocess.run([*ZIG, *flags, HERE / "joint.c", "-o", wasm]).returncode)

@@ -1,8 +1,8 @@
 """Wheels for other machines: `python builder/wheels.py FOLDER`, with the extra `wheels` installed.
 
-One for each of `TARGETS` in jointlaw/native/build.py. Each is built from the source archive, in a
-place of its own, by the packages of this environment, and holds all widths of vectors. Its
-libraries are checked: their processor, and the functions that they export.
+One wheel for each of `TARGETS` in jointlaw/native/build.py. Each is built from the source archive,
+in a separate folder, with the packages of this environment, and its libraries support all vector
+widths. The libraries are then inspected: processor and exported functions.
 """
 
 import os
@@ -23,37 +23,37 @@ PROCESSORS = {"x86_64": "X86_64", "aarch64": "ARM64"}  # of zig, and of lief
 
 
 def build_wheel(target: str, folder: Path) -> Path:
-    """The wheel for this target of zig."""
+    """Build the wheel for a target of zig and return its path."""
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT]
     subprocess.run(command, check=True, env=os.environ | {backend.TARGET: target})
     return next(folder.glob(f"*-py3-none-{backend.build.TARGETS[target]}.whl"))
 
 
-def faults(wheel: Path, target: str) -> list[str]:
-    """What is wrong with the libraries in a wheel."""
+def find_defects(wheel: Path, target: str) -> list[str]:
+    """Defects of the libraries in a wheel: wrong processor, missing functions."""
     processor, system = backend.build.Compiler((), target).machine
-    found = []
+    defects = []
     for package, builder in (("jointlaw", backend.build), ("dem_demo", backend.demo_build)):
         name = f"{package}/native/built/{builder.library_name(system)}"
         with zipfile.ZipFile(wheel) as packed:
             library = lief.parse(packed.read(name)).abstract
-        # Mach-O writes an underscore before each name
+        # Mach-O adds an underscore to each name
         exported = {function.name.removeprefix("_") for function in library.exported_functions}
         if missing := EXPORTED[package] - exported:
-            found.append(f"{name} does not export {', '.join(sorted(missing))}")
+            defects.append(f"{name} does not export {', '.join(sorted(missing))}")
         if (architecture := library.header.architecture.name) != PROCESSORS[processor]:
-            found.append(f"{name} is for {architecture}")
-    return found
+            defects.append(f"{name} is for {architecture}")
+    return defects
 
 
 def main() -> None:
-    """The command."""
+    """Run the command."""
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     for target in backend.build.TARGETS:
         wheel = build_wheel(target, Path(sys.argv[1]))
-        if wrong := faults(wheel, target):
-            sys.exit(f"{wheel}: {'; '.join(wrong)}")
+        if defects := find_defects(wheel, target):
+            sys.exit(f"{wheel}: {'; '.join(defects)}")
         print(wheel, flush=True)
 
 

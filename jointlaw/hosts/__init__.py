@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 
 class ExportOption(NamedTuple):
-    """An option of an export function that is a quantity, and of the command."""
+    """A quantity that an export function and the command take as an option."""
 
     keyword: str  # of the function; the command has --keyword, with hyphens
     unit: str  # SI

@@ -1,10 +1,10 @@
-"""Builds jointlaw.h with the system's compilers, and calls it from Python."""
+"""Build jointlaw.h with the compilers of this machine, and call it from Python."""
 
 import ctypes
 from pathlib import Path
 
 import numpy as np
-from programs import found, output
+from programs import find_program, run_program
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
@@ -17,20 +17,21 @@ HERE = Path(__file__).parent / "c"
 
 
 def build(folder, source, *flags, cc="cc", name="program"):
-    """Compile a source file or text in the folder; the program's path."""
+    """Compile a source file or text in the folder; returns the path of the program."""
     path = source
     if not isinstance(source, Path):
         path = folder / ("source.cpp" if cc.endswith("++") else "source.c")
         path.write_text(source)
-    output(found(cc), *flags, f"-I{BUILT}", path, "-o", folder / name, "-lm")
+    run_program(find_program(cc), *flags, f"-I{BUILT}", path, "-o", folder / name, "-lm")
     return folder / name
 
 
 def library(folder, *flags, cc="cc", more=""):
-    """jointlaw.h, and more text, as a shared library, built without a warning."""
+    """Build jointlaw.h and further source text as a library, without a warning, and load it."""
     flags = ["-shared", "-fPIC", *STRICT, *flags]
     path = build(folder, SOURCE + more, *flags, cc=cc, name="libjointlaw.so")
-    lib, pointer = ctypes.CDLL(str(path)), ctypes.c_void_p
+    lib = ctypes.CDLL(str(path))
+    pointer = ctypes.c_void_p
     for function in ("normal_stress", "closure", "max_stiffness"):
         getattr(lib, f"jlaw_{function}").argtypes = [pointer, ctypes.c_double]
     lib.jlaw_rotate.argtypes = [pointer, pointer, ctypes.c_double]
@@ -43,7 +44,8 @@ def library(folder, *flags, cc="cc", more=""):
         "tensile_opening",
     ):
         getattr(lib, f"jlaw_{function}").restype = ctypes.c_double
-    lib.jlaw_read.restype, lib.jlaw_fingerprint.restype = pointer, ctypes.c_char_p
+    lib.jlaw_read.restype = pointer
+    lib.jlaw_fingerprint.restype = ctypes.c_char_p
     return lib
 
 
@@ -53,16 +55,18 @@ class CLaw:
     def __init__(self, lib, law, folder):
         file = folder / "law.jlaw"
         file.write_text(table_text(law))
-        self.lib, self.message = lib, ctypes.create_string_buffer(300)
+        self.lib = lib
+        self.message = ctypes.create_string_buffer(300)
         self.law = ctypes.c_void_p(lib.jlaw_read(str(file).encode(), self.message, 300))
         assert self.law, self.message.value.decode()
         self.dim = lib.jlaw_dim(self.law)
         self.state = np.zeros(lib.jlaw_state_size(self.law))
 
     def step(self, d, tangent=True, keep=True):
-        """F and C; raises ValueError with the message of a refusal."""
+        """Advance the joint; returns F and C. Raises ValueError for an invalid step."""
         d = np.ascontiguousarray(d, float)
-        F, C = np.full(self.dim, 4711.0), np.full((self.dim, self.dim), 4711.0)
+        F = np.full(self.dim, 4711.0)
+        C = np.full((self.dim, self.dim), 4711.0)
         new = self.state if keep else self.state.copy()
         if self.lib.jlaw_update(
             self.law, at(self.state), at(new), at(d), at(F), at(C) if tangent else None,
@@ -73,8 +77,9 @@ class CLaw:
         return F, C
 
     def measures(self):
-        """sliding, slipping, separated; stored and dissipated energy."""
-        shares, state = np.zeros(3), at(self.state)
+        """Fractions sliding, slipping and separated; stored and dissipated energy."""
+        shares = np.zeros(3)
+        state = at(self.state)
         self.lib.jlaw_contact_fractions(self.law, state, at(shares))
         energies = (
             f(self.law, state)
@@ -89,7 +94,7 @@ def at(array):
 
 
 def random_law(seed):
-    """A law of any kind: each choice comes up within every few seeds."""
+    """A law of any kind; every choice occurs within a few consecutive seeds."""
     rng = np.random.default_rng(seed)
     formation = [None, "population", "individual"][seed % 3]
     eta = [0.5, 0.0, 1.0, 0.37, 0.5][seed % 5]
@@ -121,15 +126,16 @@ def random_law(seed):
 
 
 def random_bond(rng):
-    """A bond that breaks on the way of `random_path`, brittle or not in each mode."""
-    stiffness, reach = 10.0 ** rng.uniform(9.0, 12.0, 2), 10.0 ** rng.uniform(-8.0, -6.0, 2)
-    elastic = 0.5 * stiffness * reach**2
+    """A bond that fails on `random_path`, brittle or not in each mode."""
+    stiffness = 10.0 ** rng.uniform(9.0, 12.0, 2)
+    length = 10.0 ** rng.uniform(-8.0, -6.0, 2)
+    elastic = 0.5 * stiffness * length**2
     energies = np.where(rng.random(2) < 0.3, 1.0, 10.0 ** rng.uniform(0.0, 2.0, 2)) * elastic
-    return jl.Bond(*stiffness, *(stiffness * reach), *energies)
+    return jl.Bond(*stiffness, *(stiffness * length), *energies)
 
 
 def random_path(dim, seed, steps=60):
-    """Increments (steps, dim) of all sizes, apart and shut again, some components exactly zero."""
+    """Increments (steps, dim) of all sizes, with separation and new contact and exact zeros."""
     rng = np.random.default_rng(1000 + seed)
     d = rng.normal(size=(steps, dim)) * 10.0 ** rng.uniform(-9.0, -6.0, (steps, 1))
     d[0, 0] = 5e-7

@@ -4,11 +4,11 @@ import json
 import socket
 import subprocess
 
-from programs import found
+from programs import find_program
 
 
 class Chromium:
-    """One page. `said`: the errors of its console."""
+    """A browser with one page. `errors`: errors of its console."""
 
     def __init__(self, folder):
         self.pipe, theirs = socket.socketpair()
@@ -16,17 +16,20 @@ class Chromium:
         # Chromium reads from 3 and writes to 4
         command = ["bash", "-c", f'exec "$@" 3<&{theirs.fileno()} 4>&{theirs.fileno()}', "bash"]
         self.process = subprocess.Popen(
-            [*command, found("chromium"), *flags, f"--user-data-dir={folder}"],
+            [*command, find_program("chromium"), *flags, f"--user-data-dir={folder}"],
             pass_fds=[theirs.fileno()], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         theirs.close()
-        self.count, self.said, self.session, self.rest = 0, [], {}, b""
-        page = self.ask("Target.createTarget", url="about:blank")["targetId"]
-        attached = self.ask("Target.attachToTarget", targetId=page, flatten=True)
+        self.count = 0
+        self.errors = []
+        self.session = {}
+        self.rest = b""
+        page = self.call("Target.createTarget", url="about:blank")["targetId"]
+        attached = self.call("Target.attachToTarget", targetId=page, flatten=True)
         self.session = {"sessionId": attached["sessionId"]}
         for domain in ("Page", "Runtime", "Log"):
-            self.ask(f"{domain}.enable")
-        self.ask("Emulation.setDeviceMetricsOverride", width=390, height=900,  # as of a phone
+            self.call(f"{domain}.enable")
+        self.call("Emulation.setDeviceMetricsOverride", width=390, height=900,  # as of a phone
                  deviceScaleFactor=2, mobile=True)  # fmt: skip
 
     def __enter__(self):
@@ -36,8 +39,8 @@ class Chromium:
         self.pipe.close()
         self.process.wait(30)
 
-    def ask(self, method, **parameters):
-        """The result of a call of the protocol."""
+    def call(self, method, **parameters):
+        """Call a method of the protocol; returns its result."""
         self.count += 1
         call = {"id": self.count, "method": method, "params": parameters, **self.session}
         self.pipe.sendall(json.dumps(call).encode() + b"\0")
@@ -55,22 +58,23 @@ class Chromium:
         return json.loads(one)
 
     def _listen(self, event):
-        told = event.get("params", {})
-        level = told.get("type") or told.get("entry", {}).get("level")
+        parameters = event.get("params", {})
+        level = parameters.get("type") or parameters.get("entry", {}).get("level")
         if event.get("method") == "Runtime.exceptionThrown" or level in ("error", "assert"):
-            self.said.append(json.dumps(told))
+            self.errors.append(json.dumps(parameters))
 
     def run(self, script):
-        """The value of a script in the page; a promise is waited for."""
-        told = self.ask(
+        """Evaluate a script in the page and return its value, after a promise is resolved."""
+        answer = self.call(
             "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True
         )
-        assert "exceptionDetails" not in told, told
-        return told["result"].get("value")
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
 
     def wait(self, condition):
-        """Until a condition in the page is true, a minute at most."""
-        look = f"if ({condition}) done(true); else setTimeout(look, 20)"
-        late = "setTimeout(() => done(false), 60000)"
-        script = f"new Promise((done) => {{ const look = () => {{ {look} }}; look(); {late}; }})"
-        assert self.run(script), f"never: {condition}; the console says {self.said}"
+        """Wait until a condition in the page is true, one minute at most."""
+        check = f"if ({condition}) done(true); else setTimeout(check, 20)"
+        timeout = "setTimeout(() => done(false), 60000)"
+        body = f"const check = () => {{ {check} }}; check(); {timeout};"
+        script = f"new Promise((done) => {{ {body} }})"
+        assert self.run(script), f"never true: {condition}; errors of the console: {self.errors}"

@@ -1,4 +1,4 @@
-"""What the tests of all hosts share: the mark, LAMMPS' plug-in, libraries for finite elements."""
+"""Shared by the tests of all hosts: the mark, the LAMMPS plug-in, finite-element libraries."""
 
 from pathlib import Path
 

@@ -4,7 +4,7 @@ import ctypes
 
 import numpy as np
 from c_host import FAST, STRICT, at
-from programs import found, output
+from programs import find_program, run_program
 
 import jointlaw as jl
 
@@ -31,16 +31,17 @@ def export(folder, law=LAW, level="-O3", target="all"):
     jl.export_fem(law, folder, "rock", SEATING)
     quiet = ["-Wno-psabi", "-Wno-maybe-uninitialized"]  # of the header, not of these files
     flags = f"CFLAGS={' '.join([level, '-std=c99', *FAST[1:], *STRICT, *quiet])}"
-    output(found("make"), "-C", folder, target, flags)
+    run_program(find_program("make"), "-C", folder, target, flags)
     return folder
 
 
 class Behaviour:
-    """One point of a behaviour, loaded by its symbols; a step that is done is kept."""
+    """A point of a behaviour, loaded by its symbols; it keeps the state of a successful step."""
 
     def __init__(self, folder, name="rock", hypothesis="Tridimensional", properties=()):
         self.lib = ctypes.CDLL(str(folder / "librock_mgis.so"))
-        self.function, space = self.lib[f"{name}_{hypothesis}"], hypothesis == "Tridimensional"
+        self.function = self.lib[f"{name}_{hypothesis}"]
+        space = hypothesis == "Tridimensional"
         self.size = (3 if space else 2) if name == "rock" else (6 if space else 4)
         rows = ctypes.c_ushort.in_dll(self.lib, f"{name}_nInternalStateVariables").value
         sizes = {"gradients": self.size, "forces": self.size, "state": rows}
@@ -48,12 +49,14 @@ class Behaviour:
         self.old["properties"] = np.array(properties, float)
         self.new = {key: value.copy() for key, value in self.old.items()}
         self.state = self.new["state"]
-        self.rdt, self.message = np.ones(1), ctypes.create_string_buffer(512)
+        self.rdt = np.ones(1)
+        self.message = ctypes.create_string_buffer(512)
 
     def integrate(self, gradients, want=4.0):
-        """What the function returns, and K (size, size), NaN where it was not written."""
+        """Integrate; returns the exit status, and K (size, size), NaN where it was not written."""
         self.new["gradients"][:] = gradients
-        K, speed = np.full((self.size, self.size), np.nan), np.zeros(1)
+        K = np.full((self.size, self.size), np.nan)
+        speed = np.zeros(1)
         K[0, 0] = want
         view = View(dt=1.0, K=at(K), rdt=at(self.rdt), speed_of_sound=at(speed))
         view.message = ctypes.addressof(self.message)
@@ -80,16 +83,20 @@ class Umat:
     """One point of the UMAT, with n components."""
 
     def __init__(self, folder, n):
-        self.function, self.size = ctypes.CDLL(str(folder / "librock_umat.so")).umat_, n
+        self.function = ctypes.CDLL(str(folder / "librock_umat.so")).umat_
+        self.size = n
         self.stress, self.state, self.K = map(np.zeros, (n, LAW.state_size + 1, (n, n)))
-        self.energies, self.pnewdt = np.zeros(2), np.ones(1)
+        self.energies = np.zeros(2)
+        self.pnewdt = np.ones(1)
 
     def step(self, by, rows=LAW.state_size + 1):
         """Advance by an increment of the jump; stress and K."""
-        arguments, by = [None] * 37, np.ascontiguousarray(by)
+        arguments = [None] * 37
+        by = np.ascontiguousarray(by)
         numbers = self.stress, self.state, self.K, self.energies[:1], self.energies[1:]
         arguments[:5] = map(at, numbers)
-        arguments[11], arguments[27] = at(by), at(self.pnewdt)
+        arguments[11] = at(by)
+        arguments[27] = at(self.pnewdt)
         for place, whole in ((21, self.size), (22, rows), (24, 0)):
             arguments[place] = ctypes.byref(ctypes.c_int(whole))
         self.function(*arguments)

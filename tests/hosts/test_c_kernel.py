@@ -1,6 +1,6 @@
-"""The law in C gives the bits of the law in Python, and turns the axes of a joint.
+"""The law in C is bitwise identical to the law in Python, and rotates the axes of a joint.
 
-Every declared parameter, off its default, too: through the exported header and table file.
+Each declared parameter is tested at a value off its default, by header and by table file.
 """
 
 import contextlib
@@ -31,21 +31,29 @@ const jlaw_law *constants_{0}(void) {{ return &law_{0}; }}
 
 
 def many_are_one_by_one(built, one, law):
-    """21 joints of an array, each on a path of its own, until the step of one is refused."""
-    n, rows, dim = 21, len(one.state), one.dim
-    states, F, C = np.zeros((n, rows + 3)), np.zeros((n, dim)), np.zeros((n, dim, dim))
+    """Advance 21 joints of an array, each on its own path, until the step of one is invalid."""
+    n = 21
+    rows = len(one.state)
+    dim = one.dim
+    states = np.zeros((n, rows + 3))
+    F = np.zeros((n, dim))
+    C = np.zeros((n, dim, dim))
     paths = np.array([random_path(dim, seed, 12) for seed in range(n)])
     joints = law.joints(n)
     for step in range(12):
-        d, tangent = np.ascontiguousarray(paths[:, step]), step % 2
+        d = np.ascontiguousarray(paths[:, step])
+        tangent = step % 2
         stopped = n if step < 11 else 13
         d[stopped:] = np.nan
-        moved = built.jlaw_update_many(one.law, at(states), ctypes.c_size_t(rows + 3), at(d), at(F),
-                                       at(C) if tangent else None, ctypes.c_size_t(n))  # fmt: skip
-        assert moved == stopped
-        asked = joints.update(d[:moved], where=np.arange(moved), tangent=bool(tangent))
-        for a, b in zip((F, C), asked, strict=True):
-            assert b is None or (a[:moved] == b).all()
+        stride = ctypes.c_size_t(rows + 3)
+        out = at(F), at(C) if tangent else None
+        advanced = built.jlaw_update_many(
+            one.law, at(states), stride, at(d), *out, ctypes.c_size_t(n)
+        )
+        assert advanced == stopped
+        expected = joints.update(d[:advanced], where=np.arange(advanced), tangent=bool(tangent))
+        for a, b in zip((F, C), expected, strict=True):
+            assert b is None or (a[:advanced] == b).all()
         np.testing.assert_array_equal(states[:, :rows], joints.snapshot().values)
         assert not states[:, rows:].any()
 
@@ -62,8 +70,9 @@ def lib(tmp_path_factory):
 
 
 def goes_as_in_python(one, law, seed):
-    """F, C, state, energies and shares; the state of a Python joint goes on in C."""
-    path, joint = random_path(one.dim, seed), law.joint()
+    """Compare F, C, state, energies and fractions; the run starts in Python and continues in C."""
+    path = random_path(one.dim, seed)
+    joint = law.joint()
     for step in path[:10]:
         joint.update(step)
     one.state[:] = joint.snapshot().values[0]
@@ -73,8 +82,8 @@ def goes_as_in_python(one, law, seed):
         np.testing.assert_array_equal(one.state, joint.snapshot().values[0])
         shares, energies = np.split(one.measures(), [3])
         assert shares == pytest.approx(joint.measures()[:3], abs=1e-9)
-        asked = [joint.stored_energy, joint.dissipated_energy]
-        assert energies == pytest.approx(asked, rel=1e-12, abs=1e-300)
+        expected = [joint.stored_energy, joint.dissipated_energy]
+        assert energies == pytest.approx(expected, rel=1e-12, abs=1e-300)
 
 
 @pytest.mark.parametrize("name", BUILDS)
@@ -97,19 +106,20 @@ def test_both_forms_of_the_tables_give_what_python_gives(lib, tmp_path, i):
     for one in (read, compiled):
         goes_as_in_python(one, law, i)
         for closure in (-1e-6, 0.0, 1e-9, 3e-7, 2e-6):
-            asked = law.normal_stress(closure), law.max_stiffness(closure)
-            told = (f(one.law, closure) for f in (lib.jlaw_normal_stress, lib.jlaw_max_stiffness))
-            assert [*told] == pytest.approx(asked, rel=1e-12)
+            expected = law.normal_stress(closure), law.max_stiffness(closure)
+            functions = lib.jlaw_normal_stress, lib.jlaw_max_stiffness
+            values = [function(one.law, closure) for function in functions]
+            assert values == pytest.approx(expected, rel=1e-12)
         for stress in (0.0, 1e3, 5e6):
             assert lib.jlaw_closure(one.law, stress) == pytest.approx(law.closure(stress), 1e-12)
         assert lib.jlaw_fingerprint(one.law).decode() == law.fingerprint
         assert np.isnan([lib.jlaw_closure(one.law, bad) for bad in (np.nan, -1.0, np.inf)]).all()
         assert np.isnan(lib.jlaw_normal_stress(one.law, 2 * law.max_effective_closure))
-        apart = law.joint()
+        unmated = law.joint()
         with contextlib.suppress(ValueError):  # of a law whose faces always fit
-            apart = law.joint(mated=False)
-        assert lib.jlaw_init_unmated(one.law, at(one.state)) == (0 if apart.delta.any() else -1)
-        np.testing.assert_array_equal(one.state, apart.snapshot().values[0])
+            unmated = law.joint(mated=False)
+        assert lib.jlaw_init_unmated(one.law, at(one.state)) == (0 if unmated.delta.any() else -1)
+        np.testing.assert_array_equal(one.state, unmated.snapshot().values[0])
         assert lib.jlaw_tensile_opening(one.law) == law.tensile_opening
         assert lib.jlaw_has_damage(one.law) == law.tables.breaks
         intact, broken = law.joints(1), law.joints(1)
@@ -128,7 +138,7 @@ def test_both_forms_of_the_tables_give_what_python_gives(lib, tmp_path, i):
     ],
 )
 def test_a_refused_step_tells_why(lib, tmp_path, bad, words):
-    """That nothing moved is told by fuzz.c."""
+    """fuzz.c tests that an invalid step changes no state."""
     joint = CLaw(lib, random_law(0), tmp_path)
     for slot in range(joint.dim):
         with pytest.raises(ValueError, match=words):
@@ -142,7 +152,8 @@ def test_a_refused_step_tells_why(lib, tmp_path, bad, words):
 
 
 def turned(angle):
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
 
 
@@ -162,15 +173,17 @@ CASES += [  # by whole azimuths
 
 @pytest.mark.parametrize(("law", "R", "turn", "angle"), CASES)
 def test_turned_in_mid_path_is_as_in_turned_axes_from_the_start(lib, tmp_path, law, R, turn, angle):
-    one, two = CLaw(lib, law, tmp_path), CLaw(lib, law, tmp_path)
+    one = CLaw(lib, law, tmp_path)
+    two = CLaw(lib, law, tmp_path)
     path = random_path(law.dim, 5, 30)
     for step in path[:15]:
         one.step(step)
         two.step(R[: law.dim, : law.dim] @ step)
     getattr(lib, f"jlaw_{turn}")(one.law, at(one.state), *angle)
     F, F_two = ([joint.step(step)[0] for step in path[15:]] for joint in (one, two))
-    for mine, other in ((one.state, two.state), (F, F_two)):
-        assert np.abs(np.subtract(mine, other)).max() <= 1e-11 * np.abs(other).max()
+    for rotated, expected in ((one.state, two.state), (F, F_two)):
+        error = np.abs(np.subtract(rotated, expected)).max()
+        assert error <= 1e-11 * np.abs(expected).max()
 
 
 def in_sliders(joint, end):
@@ -188,10 +201,12 @@ def test_axes_turned_between_azimuths(lib, tmp_path, damage):
     errors = []
     for phi in (4, 8, 16):
         law = isotropic(phi, damage=damage)
-        joint, end = CLaw(lib, law, tmp_path), 4 + law.tables.row_counts["q"]
+        joint = CLaw(lib, law, tmp_path)
+        end = 4 + law.tables.row_counts["q"]
         for _ in range(5):
             F, _ = joint.step([1e-7, 5e-8, 2e-8])
-        stored, before = in_sliders(joint, end), joint.state.copy()
+        stored = in_sliders(joint, end)
+        before = joint.state.copy()
         lib.jlaw_rotate(joint.law, at(joint.state), 0.3)
         F_turned, _ = joint.step(np.zeros(3), keep=False)
         errors.append(np.abs(F_turned - turned(0.3) @ F).max() / np.abs(F).max())

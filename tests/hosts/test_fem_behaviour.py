@@ -1,4 +1,4 @@
-"""mgis.c and umat.c, called as their hosts call them, against the law in Python."""
+"""mgis.c and umat.c, called in the way of their hosts, against the law in Python."""
 
 import ctypes
 from concurrent.futures import ThreadPoolExecutor
@@ -17,11 +17,13 @@ LAWS = {
     "Coulomb's law": jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6),
 }
 SIGN = np.array([-1.0, 1.0, 1.0])  # closure and compression against opening and tension
-THICKNESS, YOUNG, POISSON = 1e-3, 5e10, 0.2
+THICKNESS = 1e-3
+YOUNG = 5e10
+POISSON = 0.2
 
 
 def path(seed):
-    """Steps (300, 3) in m that close, shear, open until the halves part, and close again."""
+    """Steps (300, 3) in m: closure, shear, opening to separation, and new contact."""
     d = np.random.default_rng(seed).normal(size=(300, 3)) * [3e-8, 1e-7, 1e-7]
     d[:20, 0] = 5e-8
     d[100] = [-2e-5, 0.0, 0.0]
@@ -38,7 +40,8 @@ def path(seed):
 def test_symbols_are_those_that_mgis_reads(
     finite_elements, name, kind, gradient, force, type_, properties
 ):
-    b, rows = Behaviour(finite_elements, name), LAW.state_size + 1
+    b = Behaviour(finite_elements, name)
+    rows = LAW.state_size + 1
     lists = {
         "TangentOperatorBlocks": [force, gradient], "Gradients": [gradient],
         "ThermodynamicForces": [force], "MaterialProperties": properties,
@@ -58,13 +61,13 @@ def test_symbols_are_those_that_mgis_reads(
     }  # fmt: skip
     types = {"GradientsTypes": [type_], "ThermodynamicForcesTypes": [type_],
              "InternalStateVariablesTypes": [0] * rows}  # fmt: skip
-    for kind_of_c, told in (
+    for c_type, symbols in (
         (ctypes.c_char_p, {key: [word.encode() for word in words] for key, words in texts.items()}),
         (ctypes.c_ushort, {key: [number] for key, number in numbers.items()}),
         (ctypes.c_int, types),
     ):
-        for symbol, values in told.items():
-            assert [*(kind_of_c * len(values)).in_dll(b.lib, f"{name}_{symbol}")] == values, symbol
+        for symbol, values in symbols.items():
+            assert [*(c_type * len(values)).in_dll(b.lib, f"{name}_{symbol}")] == values, symbol
 
 
 POINTS = {
@@ -79,25 +82,29 @@ POINTS = {
 
 @pytest.mark.parametrize("name", POINTS)
 def test_a_point_is_the_law_in_python(finite_elements, tmp_path, name):
-    law, folder = LAWS.get(name.partition(", ")[2], LAW), finite_elements
+    law = LAWS.get(name.partition(", ")[2], LAW)
+    folder = finite_elements
     if law is not LAW:
         folder = export(tmp_path, law, "-O0", "librock_mgis.so")
     kind, *more = POINTS[name]
-    point, joint = kind(folder, *more), law.joint(normal_stress=SEATING)
-    n, found, expected = point.size, [], []
+    point = kind(folder, *more)
+    joint = law.joint(normal_stress=SEATING)
+    n = point.size
+    results = []
+    expected = []
     signs = np.outer(SIGN, SIGN)[:n, :n]
     for d in path(1):
         d[n:] = 0.0
         T, K = point.step((SIGN * d)[:n])
         F, C = joint.update(d[: law.dim])
-        found.append((SIGN[:n] * T, signs * K, [*point.energies]))
+        results.append((SIGN[:n] * T, signs * K, [*point.energies]))
         energies = [joint.measures().stored_energy, joint.dissipated_energy]
         expected.append((F[:n], C[:n, :n], energies))
-    for i, share in enumerate((1e-12, 1e-8, 1e-12)):
-        mine, theirs = (np.array([step[i] for step in steps]) for steps in (found, expected))
-        assert np.abs(mine - theirs).max() < share * np.abs(theirs).max()
-    assert not np.any(found[100][0]), "a joint that is open must not bear stress"
-    assert np.any(found[110][0]), "a joint that touched again must bear stress"
+    for i, tolerance in enumerate((1e-12, 1e-8, 1e-12)):
+        host, python = (np.array([step[i] for step in steps]) for steps in (results, expected))
+        assert np.abs(host - python).max() < tolerance * np.abs(python).max()
+    assert not np.any(results[100][0]), "a joint that is open must not bear stress"
+    assert np.any(results[110][0]), "a joint that touched again must bear stress"
     state = joint.snapshot().values[0]  # by which Python can go on
     np.testing.assert_allclose(point.state[:-1], state, rtol=0, atol=1e-12 * np.abs(state).max())
 
@@ -107,31 +114,35 @@ def test_a_point_is_the_law_in_python(finite_elements, tmp_path, name):
     [("Tridimensional", [2, 4, 5], 6, [0, 1, 3]), ("PlaneStrain", [1, 3], 4, [0, 2])],
 )
 def test_layer_is_the_joint_over_its_thickness(finite_elements, hypothesis, at_, size, plane):
-    """Work per volume is that of the jump per area over the thickness; plane stress beside it."""
+    """Energy per volume: energy per area over the thickness, plus plane stress in the layer."""
     n = len(at_)
     layer = Behaviour(finite_elements, "rock_layer", hypothesis, [THICKNESS, YOUNG, POISSON])
     joint = Behaviour(finite_elements, "rock", hypothesis)
-    B, elastic, rng = np.zeros((n, size)), np.zeros((size, size)), np.random.default_rng(2)
+    B = np.zeros((n, size))
+    elastic = np.zeros((size, size))
+    rng = np.random.default_rng(2)
     B[range(n), at_] = THICKNESS * np.array([1.0, 2**0.5, 2**0.5])[:n]  # jump by strain: 2 h e
     stiff = np.array([[1, POISSON, 0], [POISSON, 1, 0], [0, 0, 1 - POISSON]]) / (1 - POISSON**2)
     elastic[np.ix_(plane, plane)] = YOUNG * stiff[: len(plane), : len(plane)]
     for d in path(2)[:120]:  # to a new contact
         strain = np.linalg.pinv(B) @ (SIGN * d)[:n]
         strain[plane] = 1e-6 * rng.normal(size=len(plane))
-        (stress, K), (T, C) = layer.step(strain), joint.step((SIGN * d)[:n])
+        (stress, K) = layer.step(strain)
+        (T, C) = joint.step((SIGN * d)[:n])
         total = layer.new["gradients"]
-        for found, expected in (
+        for result, expected in (
             (stress, B.T @ T / THICKNESS + elastic @ total),
             (K, B.T @ C @ B / THICKNESS + elastic),
         ):
-            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(found).max())
+            np.testing.assert_allclose(result, expected, rtol=0, atol=1e-9 * np.abs(result).max())
     stored, dissipated = np.divide(joint.energies, THICKNESS)  # per volume
     expected = [stored + 0.5 * total @ elastic @ total, dissipated]
     assert layer.energies == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_k_asks_for(finite_elements):
-    b, joint = Behaviour(finite_elements), LAW.joint(normal_stress=SEATING)
+    b = Behaviour(finite_elements)
+    joint = LAW.joint(normal_stress=SEATING)
     for d in path(3)[:30]:
         b.step(SIGN * d)
         joint.update(d)
@@ -168,8 +179,8 @@ def test_a_step_that_cannot_be_done_leaves_the_state_alone(finite_elements, capf
     if name == "rock_layer":
         b.new["properties"][0] = 0.0
         assert b.integrate(b.old["gradients"])[0] == -1
-        for told in (b.message.value.decode(), capfd.readouterr().err):  # OpenGeoSys shows stderr
-            assert "Thickness must be > 0" in told
+        for text in (b.message.value.decode(), capfd.readouterr().err):  # OpenGeoSys shows stderr
+            assert "Thickness must be > 0" in text
 
 
 def test_two_threads_do_not_meet(finite_elements):

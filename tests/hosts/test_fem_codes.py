@@ -10,20 +10,26 @@ import meshio
 import numpy as np
 import pytest
 from fem_host import LAW, SEATING
-from programs import found, output
+from programs import find_program, run_program
 
 import jointlaw as jl
 
-PRESSED, TURN, END = 10, 50, 70  # steps
+LOADED_STEP = 10  # last step of loading
+REVERSAL_STEP = 50  # last step of shear before the reversal
+LAST_STEP = 70
 
 
 def is_the_test_in_python(slip, opening, shear, pressed):
     """Direct shear of a host at 2 MPa, from row `pressed` on: 40 steps forth, 20 back."""
-    joint, turn = LAW.joint(normal_stress=SEATING), pressed + TURN - PRESSED
+    joint = LAW.joint(normal_stress=SEATING)
+    turn = pressed + REVERSAL_STEP - LOADED_STEP
     start = joint.delta[0]
     forth = jl.direct_shear(joint, slip[turn], normal=2e6, steps=turn - pressed)
-    back = jl.direct_shear(joint, slip[-1] - slip[turn], normal=2e6, steps=END - TURN)
-    peak, rise = forth.shear_stress.max(), np.ptp(forth.closure)
+    back = jl.direct_shear(
+        joint, slip[-1] - slip[turn], normal=2e6, steps=LAST_STEP - REVERSAL_STEP
+    )
+    peak = forth.shear_stress.max()
+    rise = np.ptp(forth.closure)
     for rows, record in ((slice(pressed, turn + 1), forth), (slice(turn, None), back)):
         assert np.abs(shear[rows] - record.shear_stress).max() < 1e-3 * peak
         assert np.abs(opening[rows] - (start - record.closure)).max() < 1e-3 * rise
@@ -33,18 +39,18 @@ def is_the_test_in_python(slip, opening, shear, pressed):
 def test_an_interface_element_in_kratos(finite_elements):
     if find_spec("KratosMultiphysics") is None:
         pytest.skip("Kratos is not installed (pip install 'jointlaw[fem]')")
-    output(sys.executable, "kratos.py", cwd=finite_elements)
+    run_program(sys.executable, "kratos.py", cwd=finite_elements)
     test = np.genfromtxt(finite_elements / "kratos.csv", delimiter=",", names=True)
     assert test["iterations"].max() <= 6
     # closure: each load, on a joint of its own
-    loads = -test["normal_Pa"][:PRESSED]
-    closed = LAW.closure(SEATING) - test["opening_m"][:PRESSED]
-    assert np.abs(loads / LAW.normal_stress(closed) - 1).max() < 1e-3
-    assert np.abs(loads / np.linspace(2e5, 2e6, PRESSED) - 1).max() < 1e-3
-    is_the_test_in_python(test["slip_m"], test["opening_m"], test["shear_Pa"], PRESSED - 1)
+    loads = -test["normal_Pa"][:LOADED_STEP]
+    closure = LAW.closure(SEATING) - test["opening_m"][:LOADED_STEP]
+    assert np.abs(loads / LAW.normal_stress(closure) - 1).max() < 1e-3
+    assert np.abs(loads / np.linspace(2e5, 2e6, LOADED_STEP) - 1).max() < 1e-3
+    is_the_test_in_python(test["slip_m"], test["opening_m"], test["shear_Pa"], LOADED_STEP - 1)
 
 
-def run(folder, dim, edits=(), steps=END):
+def run(folder, dim, edits=(), steps=LAST_STEP):
     """Run a project, its text changed by (old, new); jumps (m) and stresses (Pa) of the layer."""
     project = "opengeosys_2d.prj" if dim == 2 else "opengeosys_3d.xml"
     text = (folder / project).read_text()
@@ -55,8 +61,8 @@ def run(folder, dim, edits=(), steps=END):
     (folder / test).write_text(text)
     out = folder / "results"
     out.mkdir(exist_ok=True)
-    ogs = found("ogs", path=Path(sys.prefix) / "bin")
-    log = output(ogs, test, "-o", "results", cwd=folder)
+    ogs = find_program("ogs", path=Path(sys.prefix) / "bin")
+    log = run_program(ogs, test, "-o", "results", cwd=folder)
     files = [meshio.read(out / f"shear_{dim}d_{i}.vtu") for i in range(steps + 1)]
     # lower block, layer's lower and upper face, upper block
     faces = [file.point_data["displacement"].reshape(4, -1, dim)[1:3] for file in files]
@@ -69,8 +75,8 @@ def run(folder, dim, edits=(), steps=END):
 def test_direct_shear_in_opengeosys(finite_elements, dim):
     jumps, stress, log = run(finite_elements, dim)
     shear = stress[:, 3 if dim == 2 else 5]  # xx yy zz xy yz xz
-    is_the_test_in_python(jumps[:, 0], jumps[:, dim - 1], shear, PRESSED)
-    assert np.abs(stress[PRESSED:, dim - 1] + 2e6).max() < 1e-3 * 2e6
+    is_the_test_in_python(jumps[:, 0], jumps[:, dim - 1], shear, LOADED_STEP)
+    assert np.abs(stress[LOADED_STEP:, dim - 1] + 2e6).max() < 1e-3 * 2e6
     steps = re.split(r"Time step #\d+ started", log)[2:]
     iterations = [step.count("|dx|=") for step in steps]
     assert max(iterations) <= 10  # to 1e-15 m
@@ -90,18 +96,18 @@ def test_restart_in_opengeosys(finite_elements):
             "<name>still</name><type>MeshNode</type><field_name>displacement</field_name>",
         ),
     )
-    jumps, again, _ = run(finite_elements, 2, edits, 40)
+    jumps, repeated, _ = run(finite_elements, 2, edits, 40)
     np.testing.assert_allclose(jumps, whole[30:], rtol=0, atol=1e-9 * np.abs(whole).max())
-    np.testing.assert_allclose(again, stress[30:], rtol=0, atol=1e-9 * np.abs(stress).max())
+    np.testing.assert_allclose(repeated, stress[30:], rtol=0, atol=1e-9 * np.abs(stress).max())
 
 
-def moved(folder, *ways):
-    """Edits by which the upper block is moved, not pressed: down and along (m) at three times."""
+def prescribe_displacement(folder, *curve_values):
+    """Edits that prescribe displacements (m) of the upper block, normal and shear, 3 times."""
     old = re.findall(r"<coords>.*?</values>", (folder / "opengeosys_2d.prj").read_text(), re.DOTALL)
     curve = "<coords>0 20 70</coords><values>{!r} {!r} {!r}</values>"
     return (
         ("<mesh>top_2d</mesh><type>Neumann</type>", "<mesh>upper_2d</mesh><type>Dirichlet</type>"),
-        *zip(old, (curve.format(*way) for way in ways), strict=True),
+        *zip(old, (curve.format(*values) for values in curve_values), strict=True),
     )
 
 
@@ -109,8 +115,9 @@ def test_a_layer_that_is_not_level(finite_elements, tmp_path):
     """Turned by 30 degrees with all that moves it, by the lines of the page: the same stress."""
     page = (Path(__file__).parents[2] / "docs" / "native.md").read_text()
     axes, vectors = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
-    down, along = [0.0, -2e-6, -2e-6], [0.0, 0.0, 3e-6]
-    _, there, _ = run(finite_elements, 2, moved(finite_elements, down, along))
+    down = [0.0, -2e-6, -2e-6]
+    along = [0.0, 0.0, 3e-6]
+    _, there, _ = run(finite_elements, 2, prescribe_displacement(finite_elements, down, along))
     shutil.copytree(finite_elements, tmp_path / "turned")
     c = np.cos(np.radians(30))
     turn = np.array([[c, -0.5], [0.5, c]])  # columns: the two axes
@@ -120,7 +127,7 @@ def test_a_layer_that_is_not_level(finite_elements, tmp_path):
         mesh.write(path)
     x, y = (turn @ [along, down]).tolist()
     edits = (
-        *moved(finite_elements, y, x),
+        *prescribe_displacement(finite_elements, y, x),
         ("  <parameters>", f"{axes}  <parameters>{vectors}"),
     )
     _, stress, _ = run(tmp_path / "turned", 2, edits)

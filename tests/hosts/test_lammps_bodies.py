@@ -9,8 +9,11 @@ from lammps_host import HEAD, LAWS, run, thermo
 import jointlaw as jl
 from jointlaw.hosts.lammps.export import export_lammps
 
-SPACING, AREA = 0.05, 0.0025
-COLUMNS, ROWS, LAYERS = 4, 4, 2
+SPACING = 0.05
+AREA = 0.0025
+COLUMNS = 4
+ROWS = 4
+LAYERS = 2
 POINTS = COLUMNS * ROWS
 
 # a block of points on a base, the joint z = 0; `more` is what then happens
@@ -49,7 +52,12 @@ def test_points_hand_their_state_on(plugin):
     The block's 16 points own the joints (lower molecule ID); the base slides below them, tilted by
     theta, so that each column of points sees its own closure, linear in time.
     """
-    law, closure, theta, speed, dt, steps = LAWS["block"], 5e-5, 1e-5, 0.9, 2.5e-5, 4000
+    law = LAWS["block"]
+    closure = 5e-5
+    theta = 1e-5
+    speed = 0.9
+    dt = 2.5e-5
+    steps = 4000
     more = f"""group base type 1
 displace_atoms base rotate 0 0 -0.025 0 1 0 {float(np.degrees(theta))!r} units box
 fix move base move linear {speed} 0 0 units box
@@ -61,7 +69,8 @@ thermo 50
 run {steps}"""
     script = BLOCK.format(base=2, block=1, closure=closure, more=more)
     one, two = (thermo(run(plugin, script, n))[0] for n in (1, 2))
-    expected, x = np.zeros((steps + 1, 2)), SPACING * (np.arange(COLUMNS) + 0.5)
+    expected = np.zeros((steps + 1, 2))
+    x = SPACING * (np.arange(COLUMNS) + 0.5)
     for column in x:
         joint = law.joint()
         for n in range(steps + 1):
@@ -79,7 +88,10 @@ run {steps}"""
 
 def test_two_joint_sets(plugin):
     """A block in a corner: hybrid/overlay of two jointlaw with different normals and closures."""
-    law, deep, wide, sides = LAWS["block"], 3e-5, 5e-5, ROWS * LAYERS
+    law = LAWS["block"]
+    deep = 3e-5
+    wide = 5e-5
+    sides = ROWS * LAYERS
     one = "jointlaw opening 0.01 area 0.0025 plane {} closure0 {!r}"
     more = f"""region wall block -0.05 0 0 0.2 0 0.1 units box
 create_atoms 1 region wall
@@ -97,11 +109,11 @@ thermo_style custom step v_F1 v_F2 c_floor[1] c_wall[1]
 thermo_modify format float %.15g
 run 0"""
     script = BLOCK.format(base=1, block=2, closure=deep, more=more)
-    found = thermo(run(plugin, script, 2))[0]
-    assert (found["c_floor[1]"][0], found["c_wall[1]"][0]) == (POINTS, sides)
+    table = thermo(run(plugin, script, 2))[0]
+    assert (table["c_floor[1]"][0], table["c_wall[1]"][0]) == (POINTS, sides)
     for force, joints, closure in (("v_F1", POINTS, deep), ("v_F2", sides, wide)):
         expected = joints * AREA * float(law.normal_stress(closure))
-        assert found[force][0] == pytest.approx(expected, rel=1e-9), force
+        assert table[force][0] == pytest.approx(expected, rel=1e-9), force
 
 
 def test_tower(plugin):

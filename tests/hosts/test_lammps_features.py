@@ -1,4 +1,4 @@
-"""Energy, output, damping, walls, other styles beside this one, and what is done between runs."""
+"""Energy, output, damping, walls, hybrid styles, and changes between runs."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,8 @@ from lammps_host import HEAD, LAWS, dumped, run, thermo
 
 PAGE = Path(__file__).parents[2] / "docs" / "particles.md"
 R = 0.01
-AREA, MASS = np.pi * R**2, 2600 * 4 / 3 * np.pi * R**3
+AREA = np.pi * R**2
+MASS = 2600 * 4 / 3 * np.pi * R**3
 STYLE = "pair_style jointlaw opening 1e-3\npair_coeff * * rock.jlaw"
 MOTION = """neighbor 0.002 bin
 timestep 2e-6
@@ -27,7 +28,7 @@ SCENE = (
     HEAD
     + """boundary p p p
 processors * 1 1
-lattice sc {apart}
+lattice sc {spacing}
 region box block 0 4 0 4 0 4
 create_box 2 box
 create_atoms 1 box
@@ -42,9 +43,9 @@ fix 1 all nve/sphere
 )
 
 
-def heap(more, style=STYLE, apart=0.01999, heat=1e20):
+def heap(more, style=STYLE, spacing=0.01999, heat=1e20):
     """Its script; closed by 0.01 mm at first by default."""
-    return SCENE.format(style=style, apart=apart, heat=heat) + more
+    return SCENE.format(style=style, spacing=spacing, heat=heat) + more
 
 
 @pytest.mark.parametrize("processors", [1, 4])
@@ -61,10 +62,10 @@ run 200"""
     frame = (plugin / "local").read_text().split("ITEM: ENTRIES")[-1].split("\n", 1)[1]
     rows = np.array([line.split() for line in frame.splitlines()], float)[:, 1:]
     distance, energy, closure, sliding, stored, lost, _, *who = rows[rows[:, 6] > 0].T
-    one, other = (dumped(plugin / "places")[-1, ids.astype(int) - 1, :3] for ids in who)
+    first, second = (dumped(plugin / "places")[-1, ids.astype(int) - 1, :3] for ids in who)
     box = 4 * 0.01999
-    apart = np.linalg.norm(one - other - box * np.round((one - other) / box), axis=1)
-    assert np.abs(closure - (2 * R - apart)).max() < 1e-12
+    distances = np.linalg.norm(first - second - box * np.round((first - second) / box), axis=1)
+    assert np.abs(closure - (2 * R - distances)).max() < 1e-12
     assert len(distance) == table["c_joint[1]"][-1] > 20
     for one in (energy, stored):
         assert one.sum() == pytest.approx(table["PotEng"][-1], rel=1e-12)
@@ -112,8 +113,8 @@ pair_coeff * * rock.jlaw
 run 0
 clear
 """
-    again = HEAD + "read_restart damped\n" + READ.format(damping=0) + "run 0\n"
-    tables = thermo(run(plugin, PRESSED + READ.format(damping=0.5) + steps + again))
+    restart = HEAD + "read_restart damped\n" + READ.format(damping=0) + "run 0\n"
+    tables = thermo(run(plugin, PRESSED + READ.format(damping=0.5) + steps + restart))
     _, still, moving, without, restarted = tables
     closure = 2 * R - still["v_apart"][0]
     expected = AREA * float(LAWS["rock"].normal_stress(closure))
@@ -155,7 +156,8 @@ variable whole equal pe+c_ke+c_spin+v_high+c_joint[2]+c_joint[3]+c_joint[4]
 thermo_style custom step pe c_ke v_whole c_joint[1] c_joint[2] c_joint[3] c_joint[6]
 run 2000"""
     text = run(plugin, HEAD + start + MOTION + more, 2)
-    table, law = thermo(text)[0], LAWS["rock"]
+    table = thermo(text)[0]
+    law = LAWS["rock"]
     assert "nothing touches yet" in text
     step = law.critical_time_step(MASS / 7, AREA, law.closure(1e6))
     assert table["c_joint[6]"][0] == pytest.approx(step, rel=1e-9)
@@ -165,7 +167,7 @@ run 2000"""
 
 
 def test_changes_between_runs(plugin):
-    """Joints outlive what is done between two runs; deletion and a long step are told of."""
+    """Joints persist through changes between runs; warnings of deletion and of a long time step."""
     changes = ("", "atom_modify sort 1 0.01", "balance 1.0 shift x 10 1.05",
                "change_box all triclinic", "delete_atoms group gone compress no")  # fmt: skip
     more = "group gone id 57:64\nrun 200\n" + "".join(f"{one}\nrun 100\n" for one in changes)
@@ -175,6 +177,6 @@ def test_changes_between_runs(plugin):
         for name in ("PotEng", "c_joint[1]", "c_joint[2]"):
             assert second[name][0] == pytest.approx(first[name][-1], rel=1e-12), (change, name)
     assert after["c_joint[1]"][0] < before["c_joint[1]"][-1]
-    told = re.findall(r"jointlaw: (\d+) joints under load were given up", text)
-    assert sum(map(int, told)) == after["c_joint[5]"][-1] > 0
+    counts = re.findall(r"jointlaw: (\d+) joints under load were given up", text)
+    assert sum(map(int, counts)) == after["c_joint[5]"][-1] > 0
     assert "is above the largest stable one" in text

@@ -1,4 +1,4 @@
-"""Bad input and what the plug-in cannot do: one line each and exit 1, on two processors."""
+"""Invalid input and unsupported commands: a one-line error and exit status 1, on two processes."""
 
 import pytest
 from lammps_host import HEAD, run
@@ -25,7 +25,8 @@ ATOMIC = (
     .replace("set group all diameter 0.02 density 2600", "mass * 1.0")
     .replace("nve/sphere", "nve")
 )
-STYLE, COEFF = "pair_style jointlaw opening 1e-3", "pair_coeff * * rock.jlaw"
+STYLE = "pair_style jointlaw opening 1e-3"
+COEFF = "pair_coeff * * rock.jlaw"
 
 # what is changed in the good script; a part of the one line that says so
 CASES = {
@@ -85,6 +86,6 @@ def test_one_line_and_exit_1(plugin, case):
     old, new, line = CASES[case]
     script = GOOD.replace(old, new) if old else ATOMIC
     assert script != GOOD
-    told = run(plugin, script, 2, code=1).splitlines()
-    (error,) = (one for one in told if one.startswith("ERROR"))
+    lines = run(plugin, script, 2, code=1).splitlines()
+    (error,) = (one for one in lines if one.startswith("ERROR"))
     assert line in error

@@ -1,11 +1,14 @@
 """Two spheres in LAMMPS: free and spinning, against an integration in Python, over borders and
-restarts; bonded and pulled apart, where the joint is kept until the bond is broken."""
+restarts; bonded and pulled apart, where the joint exists until the bond fails."""
 
 import numpy as np
 import pytest
 from lammps_host import HEAD, LAWS, T, dumped, run
 
-R, DENSITY, DT, STEPS = 1e-2, 2600.0, 4e-7, 400
+R = 1e-2
+DENSITY = 2600.0
+DT = 4e-7
+STEPS = 400
 MASS = DENSITY * 4.0 / 3.0 * np.pi * R**3
 INERTIA = 0.4 * MASS * R * R
 APART = np.array([1.2e-2, 1.4e-2, 0.79e-2])
@@ -39,7 +42,8 @@ set atom {0} omega {7!r} {8!r} {9!r}
 
 def scene(out="out", swap=False, velocity=(0, 0, 0), damping=0.0, run=f"run {STEPS}", shift=0.0):
     """Input script of the two spheres; `swap` exchanges their IDs, `shift` (m) is along x."""
-    x, v = (X + np.array([shift, 0, 0])).tolist(), (V + velocity).tolist()
+    x = (X + np.array([shift, 0, 0])).tolist()
+    v = (V + velocity).tolist()
     order = (1, 0) if swap else (0, 1)
     atoms = "".join(
         ATOM.format(tag, *x[k], *v[k], *W[k].tolist()) for tag, k in enumerate(order, 1)
@@ -49,16 +53,26 @@ def scene(out="out", swap=False, velocity=(0, 0, 0), damping=0.0, run=f"run {STE
 
 def in_python(law):
     """x, v, spin and force (STEPS, 2, 12) of the same by velocity Verlet with `law.joint()`."""
-    x, v, w = X.copy(), V.copy(), W.copy()
-    joint, axis2, area = law.joint(), None, np.pi * R * R
-    F, T, rows = np.zeros((2, 3)), np.zeros((2, 3)), []
+    x = X.copy()
+    v = V.copy()
+    w = W.copy()
+    joint = law.joint()
+    axis2 = None
+    area = np.pi * R * R
+    F = np.zeros((2, 3))
+    T = np.zeros((2, 3))
+    rows = []
     for _ in range(STEPS):
-        v, w = v + 0.5 * DT * F / MASS, w + 0.5 * DT * T / INERTIA
+        v = v + 0.5 * DT * F / MASS
+        w = w + 0.5 * DT * T / INERTIA
         x = x + DT * v
         d = x[1] - x[0]
         r = np.linalg.norm(d)
-        n, closure, arm = d / r, 2 * R - r, 0.5 * r
-        F, T = np.zeros((2, 3)), np.zeros((2, 3))
+        n = d / r
+        closure = 2 * R - r
+        arm = 0.5 * r
+        F = np.zeros((2, 3))
+        T = np.zeros((2, 3))
         if axis2 is None and closure > 0:
             k = int(np.argmin(np.abs(n)))
             axis2 = np.eye(3)[k] - n[k] * n
@@ -72,12 +86,14 @@ def in_python(law):
             step = [closure - joint.delta[0], DT * (slide @ axis2), DT * (slide @ axis3)]
             f, _ = joint.update(step)
             if closure < 0 and not f.any():
-                joint, axis2 = law.joint(), None
+                joint = law.joint()
+                axis2 = None
             else:
                 F[1] = area * (f[0] * n - f[1] * axis2 - f[2] * axis3)
                 F[0] = -F[1]
                 T[:] = -arm * np.cross(n, F[1])
-        v, w = v + 0.5 * DT * F / MASS, w + 0.5 * DT * T / INERTIA
+        v = v + 0.5 * DT * F / MASS
+        w = w + 0.5 * DT * T / INERTIA
         rows.append(np.hstack([x, v, w, F]))
     return np.array(rows)
 
@@ -92,12 +108,12 @@ def test_two_free_spinning_spheres(plugin):
     """1e-12 of the largest of each, over an oblique collision: approach, slip, parting."""
     expected = in_python(LAWS["rock"])
     run(plugin, scene())
-    found = dumped(plugin / "out")[1:, :, 1:13]
+    result = dumped(plugin / "out")[1:, :, 1:13]
     touching = np.flatnonzero(np.abs(expected[..., 9:]).max(axis=(1, 2)))
     assert 0 < touching[0] < touching[-1] < STEPS - 10  # the whole collision
-    assert differ(found, expected) < 1e-12
+    assert differ(result, expected) < 1e-12
     run(plugin, scene(swap=True))
-    assert differ(dumped(plugin / "out")[1:, ::-1, 1:13], found) < 1e-13
+    assert differ(dumped(plugin / "out")[1:, ::-1, 1:13], result) < 1e-13
 
 
 DRIFT = (150.0, 0.0, 0.0)  # m/s: one sphere after the other crosses the border while they touch
@@ -131,7 +147,8 @@ def test_two_processors_and_restart(plugin, kind):
     motion = {"velocity": DRIFT} if kind == "crossing" else {"shift": -0.1}
     run(plugin, scene(damping=0.1, **motion), 2)
     frames = dumped(plugin / "out")
-    owner, moment = frames[..., -1].astype(int), 150
+    owner = frames[..., -1].astype(int)
+    moment = 150
     force = np.abs(frames[..., 10:13]).max(axis=(1, 2))
     if kind == "crossing":
         assert {tuple(pair) for pair in owner[force > 0]} >= {(0, 0), (1, 1)}
@@ -182,10 +199,11 @@ def pulled(folder, motion, apart, law="bonded"):
 @pytest.mark.parametrize("law", ["bonded", "coulomb"])
 @pytest.mark.parametrize("closed", [1e-9, -4e-18])
 def test_pulled_apart(plugin, law, closed):
-    """The force is that of the law at each opening: up to tension times area, then none. Spheres
-    that are drawn to touch do, whichever way the distance is rounded."""
+    """The force is the traction of the law at each opening: up to tension times area, then zero.
+    Spheres at the distance of touch are in contact, whichever way the distance is rounded."""
     opening, force = pulled(plugin, "1.0 0.0 0.0\nrun 600", 2 * R - closed, law)
-    area, joint = np.pi * R * R, LAWS[law].joint()
+    area = np.pi * R * R
+    joint = LAWS[law].joint()
     steps = np.diff(-opening, prepend=0.0)
     expected = [-area * joint.update([d, 0.0, 0.0])[0][0] for d in steps]
     np.testing.assert_allclose(force, expected, atol=1e-6 * T * area)
@@ -194,7 +212,7 @@ def test_pulled_apart(plugin, law, closed):
 
 
 def test_spheres_that_meet_have_no_bond(plugin):
-    """They touch in the run, and part again by themselves: nothing holds them."""
+    """They touch during the run and separate again without tension."""
     back = "unfix 1\nfix 1 moving move linear 1.0 0.0 0.0\nrun 900"
     opening, force = pulled(plugin, f"-1.0 0.0 0.0\nrun 60\n{back}", 2 * R + 1e-6)
     assert (force[:61] < 0.0).any()

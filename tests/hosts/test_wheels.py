@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_host import HERE, random_law, random_path
-from programs import found, output
+from programs import find_program, run_program
 
 from jointlaw.hosts.c.export import table_text
 from jointlaw.native import build
@@ -26,21 +26,22 @@ def wheels(tmp_path_factory):
     for name in ("build", "lief", "ziglang"):  # of the extra `wheels`
         pytest.importorskip(name)
     folder = tmp_path_factory.mktemp("wheels")
-    output(sys.executable, ROOT / "builder" / "wheels.py", folder, timeout=3000)
+    run_program(sys.executable, ROOT / "builder" / "wheels.py", folder, timeout=3000)
     return folder
 
 
 def test_a_wheel_for_each_machine(wheels):
-    made = {path.stem.partition("-py3-none-")[2] for path in wheels.glob("*.whl")}
-    assert made == set(build.TARGETS.values())
+    built = {path.stem.partition("-py3-none-")[2] for path in wheels.glob("*.whl")}
+    assert built == set(build.TARGETS.values())
 
 
 def test_arm_gives_the_bits_of_this_machine(wheels, tmp_path):
-    """The library of the wheel, which there gives those of the header: laws of all kinds."""
-    qemu = found("qemu-aarch64")
+    """The library of the wheel and the header agree on ARM, for laws of all kinds."""
+    qemu = find_program("qemu-aarch64")
     wheel = next(wheels.glob(f"*{build.TARGETS[ARM]}.whl"))
     library = zipfile.ZipFile(wheel).extract("jointlaw/native/built/libjointlaw.so", tmp_path)
-    program, flags = tmp_path / "library", [*build.FLAGS, f"-I{build.BUILT}", f"-I{build.HERE}"]
+    program = tmp_path / "library"
+    flags = [*build.FLAGS, f"-I{build.BUILT}", f"-I{build.HERE}"]
     build.zig(ARM).run(*flags, HERE / "library.c", "-o", program, "-lm", "-ldl")
     for seed in (*PLAIN, 3, 7, 13, 20):
         law = random_law(seed)

@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 from yade_host import make_table, run_scene
 
-R, KN, K2, K3 = 0.5, 1e5, 7.5e4, 2.5e4  # m; Pa/m, of the joint that is not even
+R = 0.5  # m
+KN = 1e5  # Pa/m: stiffnesses of the anisotropic joint
+K2 = 7.5e4
+K3 = 2.5e4
 FRICTION = (0.4, 5.0)
-SHARES = (0.02, 0.1, 0.3)  # time step over sqrt(m/k)
-OVERLAP, SPIN, TURNS = 0.1, 0.02, (2.0, -0.5)  # m; rad, of id2 about z; rad, of both about x
+RELATIVE_TIME_STEPS = (0.02, 0.1, 0.3)  # time step over sqrt(m/k)
+OVERLAP = 0.1  # m
+SPIN = 0.02  # rad, of id2 about z
+TURNS = (2.0, -0.5)  # rad, of both about x
 
 SCENES = f"""
 R = {R}
@@ -47,7 +52,7 @@ def twist(N=400):
         O.run(N, True)
         for body in O.bodies: body.state.angVel = (0, 0, 0)
         O.step()
-        f, n, t2 = joints.F[:, 0], joints.c["n"][:, 0], joints.c["t2"][:, 0]
+        f, n, t2 = joints.F[:, 0], joints.contact_data["n"][:, 0], joints.contact_data["t2"][:, 0]
         out.append(area * (f[0] * n + f[1] * t2 + f[2] * np.cross(n, t2)))
     return out
 
@@ -74,7 +79,7 @@ result(
     native=[[collide(False, mu, touch)[0] for touch in touches] for mu in {FRICTION}],
     joint=[[collide(True, mu, touch) for touch in touches] for mu in {FRICTION}],
     twist=twist(),
-    tops=[bounce(share) for share in {SHARES}],
+    tops=[bounce(share) for share in {RELATIVE_TIME_STEPS}],
 )
 """
 
@@ -100,7 +105,8 @@ def test_oblique_collision_equals_yades_own_linear_law(scenes, case):
     """
     native = np.array(scenes["native"][case])
     joint, before, after = (np.array(part) for part in zip(*scenes["joint"][case], strict=True))
-    speed, spin = 0.1, 3.0
+    speed = 0.1
+    spin = 3.0
     off = np.abs(joint - native)
     turned = np.abs(native[..., 3:] - [[3, 0.5, 2], [-1, 2, 1.2]])
     assert turned.max() > 0.3 * min(FRICTION[case], 1)
@@ -113,12 +119,14 @@ def test_oblique_collision_equals_yades_own_linear_law(scenes, case):
     assert change[:, 3:].max() < 1e-9 * np.abs(before).max()
 
 
-@pytest.mark.parametrize(("case", "bound"), [(0, 1e-4), (1, 1e-4), (2, 5e-4)], ids=SHARES)
+@pytest.mark.parametrize(
+    ("case", "bound"), [(0, 1e-4), (1, 1e-4), (2, 5e-4)], ids=RELATIVE_TIME_STEPS
+)
 def test_an_undamped_bounce_keeps_its_amplitude(scenes, case, bound):
-    """50 cycles: change of the amplitude per cycle, slope of a line through its logarithm.
+    """Change of the amplitude per cycle over 50 cycles: slope of a line through its logarithm.
 
-    Leapfrog with a force that depends on position alone conserves a nearby energy: what is left is
-    the reading of the peak between steps.
+    Leapfrog with a force that depends on position only conserves a nearby energy. The remaining
+    change is the error of the peak between two steps.
     """
     top = scenes["tops"][case]
     assert len(top) >= 50
@@ -132,12 +140,14 @@ def test_axes_turn_with_one_body_and_the_force_with_both(scenes):
     with the mean of the two. The contact is half-way in the overlap. The mean of two turns has an
     error of second order in the step: 2e-6 in 400 steps.
     """
-    area, turn = np.pi * R**2, np.exp(1j * TURNS[0])
+    area = np.pi * R**2
+    turn = np.exp(1j * TURNS[0])
     slip = SPIN * (R - OVERLAP / 2)
     first, turned, last = (F[1] + 1j * F[2] for F in scenes["twist"])
     assert first == pytest.approx(area * K2 * slip, rel=1e-5)
     assert turned == pytest.approx(first * np.exp(0.5j * sum(TURNS)), rel=1e-5)
-    along, across = turn.real * turn, -turn.imag * 1j * turn  # parts of y, by the axes of id1
+    along = turn.real * turn
+    across = -turn.imag * 1j * turn  # parts of y, by the axes of id1
     more = area * slip * (K2 * along + K3 * across)
     assert last == pytest.approx(turned + more, rel=1e-5)
     assert [F[0] for F in scenes["twist"]] == pytest.approx([area * KN * OVERLAP] * 3, rel=1e-5)

@@ -1,4 +1,4 @@
-"""Live mode in the real YADE: the full path-dependent law; states that are saved and loaded."""
+"""Live mode in the real YADE: the path-dependent law; checkpoints."""
 
 import dataclasses
 import re
@@ -84,7 +84,8 @@ def reload(live):
         O.bodies[-1].state.angVel = Vector3(*rng.uniform(-3, 3, 3).tolist())
     engines(keep=live, gravity=(0, 0, -200 if live else -30), damping=0.4 if live else 0.1)
     def adapter():
-        return Joints(LiveLaw(law), forget=0.1 * end) if live else Joints(TableLaw("joint.txt"))
+        if live: return Joints(LiveLaw(law), max_opening=0.1 * end)
+        return Joints(TableLaw("joint.txt"))
     def picture():
         return [list(b.state.pos) + list(b.state.ori) + list(b.state.vel) + list(b.state.angVel)
                 for b in O.bodies if b]
@@ -119,10 +120,11 @@ out = dict(
     pieces=pieces(),
     reload=[reload(False), reload(True)],
     visits=dict(table=visits(TableLaw("short.txt"), False, 1e-3),
-                live=visits(LiveLaw("law.toml"), True, .3 * end, forget=.1 * end),
-                bonded=visits(LiveLaw(bonded), True, .3 * end, forget=.1 * end),
-                late=visits(LiveLaw(bonded), True, .3 * end, True, forget=.1 * end),
-                coulomb=visits(LiveLaw("coulomb.toml"), True, .3 * end, True, forget=.1 * end)))
+                live=visits(LiveLaw("law.toml"), True, .3 * end, max_opening=.1 * end),
+                bonded=visits(LiveLaw(bonded), True, .3 * end, max_opening=.1 * end),
+                late=visits(LiveLaw(bonded), True, .3 * end, True, max_opening=.1 * end),
+                coulomb=visits(LiveLaw("coulomb.toml"), True,
+                               .3 * end, True, max_opening=.1 * end)))
 
 slab_and_sphere()
 O.bodies[1].state.pos = (0, 0, .5 - .1 * end)
@@ -152,7 +154,8 @@ def law():
 @pytest.fixture(scope="module")
 def worn(law):
     """The same law with asperities that yield, slopes that wear, and a bond."""
-    end, tension = law.closure_range, 5e6
+    end = law.closure_range
+    tension = 5e6
     return dataclasses.replace(
         law, asperity=dataclasses.replace(law.asperity, yield_interference=0.1 * end),
         mating_length=4 * end, slope_wear=1e4, slope_residual=0.3,
@@ -180,7 +183,8 @@ def test_pieces_of_one_plane_equal_pure_python(scenes, worn):
     positions: 1e-16 m of 1e-3 m.
     """
     moved, F, force, measures = (np.array(part) for part in scenes["pieces"].values())
-    path, joint = moved @ [[1, 0, 0], [0, -1, 0]], worn.joint()  # of id1 against id2
+    path = moved @ [[1, 0, 0], [0, -1, 0]]
+    joint = worn.joint()  # of id1 against id2
     exact = np.array([joint.update(d)[0] for d in np.diff(path, axis=0, prepend=np.zeros((1, 3)))])
     peak = np.abs(exact).max()
     assert np.abs(exact[:, 1]).max() > 0.1 * peak
@@ -239,7 +243,8 @@ def test_save_reload_continue_equals_an_unbroken_run(scenes, live):
     last, again, early = out["counts"]
     assert early > 5
     assert last == again
-    unbroken, F = np.array(out["unbroken"]), np.array(out["F"])
+    unbroken = np.array(out["unbroken"])
+    F = np.array(out["F"])
     assert np.abs(out["again"] - unbroken).max() < 1e-9 * np.abs(unbroken).max()
     assert np.abs(out["F_again"] - F).max() < 1e-6 * np.abs(F).max()
 

@@ -1,4 +1,4 @@
-"""Table mode in the real YADE: what the table says is the force on the body."""
+"""Table mode in the real YADE: the force on the body follows from the table."""
 
 from pathlib import Path
 
@@ -99,7 +99,7 @@ def stepped(**options):
     O.step()
 O.bodies[1].state.pos = (0, 0, .499)
 attempt("area", lambda: joints(area=-1))
-attempt("forget", lambda: joints(forget=nan))
+attempt("max_opening", lambda: joints(max_opening=nan))
 attempt("areas", lambda: stepped(area=lambda i: -1))
 slab_and_sphere()
 O.bodies[1].state.pos = (0, 0, .499)
@@ -111,7 +111,7 @@ slab_and_sphere()
 engines()
 first = attached(TableLaw("joint.txt"))
 attempt("taken", lambda: joints().attach())
-yade_joint._running["joints"] = first
+yade_joint._attached["joints"] = first
 O.dt = 1e-6
 O.run(5, True)
 O.engines[3].dead = True
@@ -211,8 +211,8 @@ def test_time_step_knows_the_area_however_it_is_given(scenes):
     assert "call time_step() after the first step" in out["function"][1]
 
 
-def test_a_saved_state_of_version_1_is_read(scenes):
-    """The run goes on from the specimen as from the state in memory."""
+def test_a_checkpoint_of_version_2_is_read(scenes):
+    """The run continues from the file in specimens as from the state in memory."""
     unbroken, resumed = np.array(scenes["resumed"])
     assert unbroken[-1, 1] < 0 < unbroken[-1, 0]
     np.testing.assert_array_equal(resumed, unbroken)
@@ -224,8 +224,8 @@ def test_refusals_name_the_remedy(scenes):
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
         "keep": "neverErase=True", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
-        "forget": "forget = nan", "areas": "area = -1.0 m2 of contact",
-        "version": "start the run anew", "missed": "every step", "taken": "give another name=",
+        "max_opening": "max_opening = nan", "areas": "area = -1.0 m2 of contact",
+        "version": "start the run again", "missed": "every step", "taken": "give another name=",
         "npz table": "export the law again",
     }  # fmt: skip
     assert {name: part for name, part in words.items() if part not in scenes["told"][name]} == {}
@@ -233,11 +233,13 @@ def test_refusals_name_the_remedy(scenes):
 
 
 def test_only_selected_contacts_are_joints(scenes):
-    """The other keeps YADE's own linear force; a body that is erased takes its joint along.
+    """The other contact keeps the linear force of YADE; the joint of an erased body is deleted.
 
-    A mated joint begins at zero closure where it is first seen, here at an overlap of 1 mm.
+    A mated joint starts at zero closure in the position in which its contact forms, here at an
+    overlap of 1 mm.
     """
-    out, law = scenes["selected"], AREA * 1e8 * 1e-3
+    out = scenes["selected"]
+    law = AREA * 1e8 * 1e-3
     assert out["forces"] == pytest.approx([law, 1e3 * 1e-3], rel=1e-6)
     assert out["shown"] == pytest.approx(out["forces"][0], rel=1e-9)
     assert out["left"] == [1, 0]
@@ -247,7 +249,7 @@ def test_only_selected_contacts_are_joints(scenes):
 def test_exported_script_runs_without_jointlaw(jing):
     """A sphere settles; it sticks 0.1 degree below the friction angle and slides above.
 
-    At rest but for what is left of the oscillation: 2e-6 of the load.
+    At rest, except for an oscillation of 2e-6 of the load.
     """
     text = run_yade(jing[0], "settle_and_incline.py")
     settled = next(line for line in text.splitlines() if line.startswith("settled"))
@@ -267,14 +269,15 @@ print("\\nRESULT " + json.dumps(
 
 
 def test_script_of_the_page(tmp_path):
-    """A sphere comes to rest on the joint, as printed in docs/particles.md.
+    """A sphere comes to rest on the joint, by the script of docs/particles.md.
 
-    Damped to rest within 10 000 steps: what is left of the bounce was 0.02 %.
+    After 10 000 damped steps the bounce is 0.02 % of the load.
     """
     jl.export_yade(jl.presets.load("jing-replica"), tmp_path, azimuths=3, steps=10)
     page = Path(__file__).parents[2] / "docs" / "particles.md"
     block = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
-    found = run_scene(tmp_path, block + ASK, preamble="")
-    (area,), (traction,) = found["area"], found["traction"]
+    contacts = run_scene(tmp_path, block + ASK, preamble="")
+    (area,) = contacts["area"]
+    (traction,) = contacts["traction"]
     assert area * traction[0] == pytest.approx(2600 * 4 / 3 * np.pi * 0.1**3 * 9.81, rel=0.01)
     assert (tmp_path / "half.npz").exists()

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import numpy as np
-from programs import found, output
+from programs import find_program, run_program
 
 import jointlaw as jl
 from jointlaw.hosts.yade.export import copy_files
@@ -73,14 +73,16 @@ def attempt(name, action):
 
 
 def run_yade(folder, script, *args, live=False, code=0):
-    """What YADE prints when it runs this script of the folder, which is also where it runs."""
+    """Run a script in its folder with YADE; returns the output."""
     env = os.environ | {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
     env["PYTHONPATH"] = str(Path(jl.__file__).parents[1]) if live else ""
-    return output(found("yade"), "-n", "-x", script, *args, code=code, cwd=folder, env=env)
+    return run_program(
+        find_program("yade"), "-n", "-x", script, *args, code=code, cwd=folder, env=env
+    )
 
 
 def run_scene(folder, script, live=False, preamble=PREAMBLE):
-    """What a scene passed to `result(...)`, by name."""
+    """Run a scene; returns the values that it passes to `result(...)`, by name."""
     (folder / "scene.py").write_text(preamble + script)
     copy_files(folder)
     _, mark, rest = run_yade(folder, "scene.py", live=live).rpartition(MARK)
@@ -90,8 +92,10 @@ def run_scene(folder, script, live=False, preamble=PREAMBLE):
 
 def make_table(path, kn=1e8, ks=5e7, mu=0.4, eta=0.0, end=1e-2, uneven=0.0, uneven_mu=0.0):
     """Write a table with known answers: sn = kn un^(1 + eta), elastic-frictional shear."""
-    un, psi = end * np.linspace(0, 1, 81) ** 2, np.arange(12) * np.pi / 12
-    wave, power = np.cos(2 * psi), un[:, None] ** eta
+    un = end * np.linspace(0, 1, 81) ** 2
+    psi = np.arange(12) * np.pi / 12
+    wave = np.cos(2 * psi)
+    power = un[:, None] ** eta
     friction = np.repeat(mu * (1 + uneven_mu * wave)[None], 81, axis=0)
     table = jl.JointTable(
         un, kn * un ** (1 + eta), kn * un**eta, (1 + eta) * kn * un**eta, psi,

@@ -62,7 +62,8 @@ def script() -> str:
     rocks = {}
     for name in presets.names():
         law = presets.load(name)
-        o, p = law.orientation, law.asperity
+        o = law.orientation
+        p = law.asperity
         rocks[name] = {
             "a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "range": law.closure_range,
             "tables": _text(tables(law)),

@@ -1,13 +1,12 @@
-"""A sphere settles on a joint; then the joint is tilted.
+"""A sphere settles on a joint; then the load is inclined.
 
     yade -n -x settle_and_incline.py          # the table
-    yade -n -x settle_and_incline.py live     # the law itself (package `jointlaw` on PYTHONPATH)
+    yade -n -x settle_and_incline.py live     # the law (package `jointlaw` on PYTHONPATH)
 
-A sphere (rotation blocked, so that it is a slider) lies on a fixed box and is pressed on it. When
-it is at rest, the normal stress that the joint has at its closure is compared with the load. Then
-the load is tilted. With the table the sphere sticks 0.1 degree below the friction angle, and slides
-0.1 degree above. The law itself slips at every tilt: slip and rise are compared with those of a
-shear test on one joint.
+A sphere with blocked rotation lies on a fixed box under a normal load. At static equilibrium the
+normal stress of the joint at its closure is compared with the load. Then the load is inclined. With
+the table the sphere sticks 0.1 degree below the friction angle and slides 0.1 degree above it. The
+law slips at every inclination: slip and dilation are compared with a shear test on one joint.
 """
 
 import os
@@ -42,7 +41,9 @@ if unknown := set(sys.argv[1:]) - {"live"}:
         "table"
     )
 live = "live" in sys.argv[1:]
-STEPS = 4000 if live else 1000  # of a change of load: shear makes the law itself soft, so slow
+STEPS = (
+    4000 if live else 1000
+)  # of a change of load; more for the law, whose shear stiffness decreases
 path = os.path.join(folder, "joint.txt")
 table = TableLaw(path).table
 stress = 0.1 * table.normal_stress[-1]
@@ -53,7 +54,7 @@ if live:
 
 
 def settle():
-    """A sphere on a box, pressed slowly; returns the closure at rest."""
+    """Load a sphere on a box slowly; returns the closure at static equilibrium."""
     O.reset()
     O.materials.append(FrictMat(young=1e9, poisson=0.3, frictionAngle=0.5, density=2600))
     O.bodies.append(utils.box((0, 0, -0.1), (10, 10, 0.1), fixed=True))
@@ -71,41 +72,42 @@ def settle():
     ]
     joints = Joints(LiveLaw(law) if live else TableLaw(path))
     joints.attach()
-    O.dt = joints.time_step(safety=1)  # made for rolling and six contacts: here there is one
-    pull((0, 0, 0), (0, 0, -stress * AREA))
+    O.dt = joints.time_step(safety=1)  # it allows for rolling and six contacts; this sphere has one
+    change_load((0, 0, 0), (0, 0, -stress * AREA))
     return R - O.bodies[1].state.pos[2]
 
 
 def tilt(angle, azimuth):
-    """Settle, tilt the load slowly (degrees; the normal force stays), and wait.
+    """Settle, incline the load slowly (degrees; constant normal force), and continue at rest.
 
-    The box is sheared along azimuth. Returns how far the sphere slides while it waits, how far it
-    has slid in all, and how far it has risen.
+    The box is sheared along azimuth. Returns the slip of the sphere at constant load, its total
+    slip and its rise.
     """
     z = R - settle()
-    shear, psi = stress * AREA * np.tan(np.radians(angle)), np.radians(azimuth)
+    shear = stress * AREA * np.tan(np.radians(angle))
+    psi = np.radians(azimuth)
     start = np.array([0, 0, -stress * AREA])
-    pull(start, start - shear * np.array([np.cos(psi), np.sin(psi), 0]))
+    change_load(start, start - shear * np.array([np.cos(psi), np.sin(psi), 0]))
     before = O.bodies[1].state.pos
     O.run(500, True)
     at = O.bodies[1].state.pos
     return (at - before).norm(), np.hypot(at[0], at[1]), at[2] - z
 
 
-def pull(start, end):
-    """Change the force on the sphere from start to end, without a jerk, and let it come to rest."""
-    for share in (1 - np.cos(np.linspace(0, np.pi, STEPS + 1))) / 2:
-        force = (1 - share) * np.array(start) + share * np.array(end)
+def change_load(start, end):
+    """Change the force on the sphere smoothly from start to end, then continue at constant load."""
+    for fraction in (1 - np.cos(np.linspace(0, np.pi, STEPS + 1))) / 2:
+        force = (1 - fraction) * np.array(start) + fraction * np.array(end)
         O.forces.setPermF(1, force.tolist())
         O.step()
     O.run(500, True)
 
 
 closure = settle()
-there = law.normal_stress(closure) if live else table.lookup(closure).normal_stress
-off = abs(there / stress - 1)
+normal_stress = law.normal_stress(closure) if live else table.lookup(closure).normal_stress
+error = abs(normal_stress / stress - 1)
 print(f"settled: closure {closure:.12g} m, where the {'law' if live else 'table'} has the normal "
-      f"stress {there:.12g} Pa; relative difference to the load {off:.1e}")  # fmt: skip
+      f"stress {normal_stress:.12g} Pa; relative difference to the load {error:.1e}")  # fmt: skip
 if live:
     test = direct_shear(law.joint(), law.closure_range, normal=stress, steps=1000)
     for angle in (15.0, 30.0):
@@ -116,9 +118,10 @@ if live:
               f"shear test: {expected:.5g} m, {up:.5g} m")  # fmt: skip
 else:
     for azimuth in (0.0, 45.0, 90.0):
-        there = table.lookup(closure, np.radians(azimuth))
-        angle = np.degrees(np.arctan(there.peak_friction))
-        for more in (-0.1, 0.1):
-            moved = tilt(angle + more, azimuth)[0] / closure
-            print(f"azimuth {azimuth:.0f} deg: friction angle {angle:.4f} deg, {more:+.1f} deg: "
-                  f"{'slides' if moved > 1e-3 else 'sticks'} ({moved:.1e} closures)")  # fmt: skip
+        friction = table.lookup(closure, np.radians(azimuth)).peak_friction
+        angle = np.degrees(np.arctan(friction))
+        for offset in (-0.1, 0.1):
+            relative_slip = tilt(angle + offset, azimuth)[0] / closure
+            motion = "slides" if relative_slip > 1e-3 else "sticks"
+            print(f"azimuth {azimuth:.0f} deg: friction angle {angle:.4f} deg, {offset:+.1f} deg: "
+                  f"{motion} ({relative_slip:.1e} closures)")  # fmt: skip

@@ -5,50 +5,67 @@
     joints.attach()                             # after O.engines is set
     O.dt = joints.time_step()
 
-YADE finds the contacts. In every step, after `InteractionLoop`, the adapter computes the joint's
-traction on all of them at once and adds force and torque to the bodies; YADE's own contact force
-is switched off (kn = ks = 0) on these contacts, and taken back in the one step in which a contact
-is new. So the force on a body is that of the law at the positions of the same step.
+Why it works as it does:
 
-Frame of a contact: axis 1 is YADE's contact normal (from body id1 to id2), axis 2 the direction
-`azimuth`, which is fixed to body id1 and projected on the contact plane, axis 3 = axis 1 x axis 2.
-Displacement is that of body id1 against body id2, closure positive; the force on id1 is -area * F.
+- Python cannot define a contact law (`Law2`) in YADE. The adapter is a `PyRunner` that runs after
+  `InteractionLoop`. YADE does contact detection and geometry; the adapter computes the traction of
+  all joints at once and adds force and torque to the bodies. So a force belongs to the positions of
+  the same step, which keeps the time integration symplectic.
+- The contact force of YADE is switched off by kn = ks = 0. YADE has already applied its force
+  in the step in which a contact forms; the adapter subtracts it.
+- The history of a joint belongs to a contact, not to a pair of bodies: two bodies that separate and
+  meet again form a new contact. YADE may replace an interaction by a new one of the same bodies, so
+  `interaction_key` is the two ids and the iteration in which the interaction became real.
+- Each step compares YADE's number of real interactions with the number of known ones. Interactions
+  that ended are recognised by `isReal`, new ones by `iterMadeReal`. If the numbers do not agree,
+  for example after bodies were erased or a scene was loaded, all interactions are matched by key.
+- Arrays hold one column per contact, in the order of `interactions`. Law, geometry and forces are
+  computed for all contacts in a few calls of numpy.
+- The frame of a contact rotates with the bodies. Increments are computed in the mean frame of a
+  step, with rotation vectors for which a rigid motion of the pair, however large, gives exactly
+  zero.
+- Python objects are not part of `O.save`: `Joints.save` and `Joints.load` store the state.
+
+Frame of a contact: axis 1 is the contact normal of YADE (from body id1 to id2), axis 2 the
+direction `azimuth`, which is fixed to body id1 and projected on the contact plane, axis 3 =
+axis 1 x axis 2.
+Displacements are of body id1 relative to body id2, closure positive; the force on id1 is -area * F.
 SI units: m, Pa, N, s, kg.
 """
 
-# ruff: noqa: B905 (runs on older Python too)
+# ruff: noqa: B905 (older versions of Python lack strict=)
 
 import numpy as np
 from joint_table import load_table
 from yade import Body, FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
 
-VERSION = 1  # of the files that `Joints.save` writes
+VERSION = 2  # of the files that `Joints.save` writes
 
-_running = {}  # name -> Joints that were attached or loaded: what the PyRunner of each calls
+_attached = {}  # name -> Joints; the PyRunner of each finds them here
 
 
 def run(name):
     """One step of the adapter called `name`: the command of its PyRunner."""
-    if name not in _running:
+    if name not in _attached:
         raise RuntimeError(
             f"no joints {name!r} are attached or loaded in this process: to continue a saved run, "
             f"create Joints(..., name={name!r}) after O.load and call .load(file). For new joints "
             f"remove the engine joint_{name} from O.engines and call .attach()"
         )
-    _running[name].step()
+    _attached[name].step()
 
 
-# ------------------------------------------------------- the law behind the contacts
+# -------------------------------------------------------------- laws of the contacts
 
 
 class TableLaw:
-    """The law's table, a text file: normal stress by closure, elastic-frictional shear."""
+    """A law as a table, a text file: normal stress by closure, elastic-perfectly plastic shear."""
 
     mode = "table"
 
     def __init__(self, path):
         self.table = load_table(path)
-        self.f = np.zeros((2, 0))  # shear traction in the frames of the contacts
+        self.shear_traction = np.zeros((2, 0))  # in the frames of the contacts
         self.K = np.zeros((3, 0))  # shear stiffness K22, K33, K23 of the last step
 
     def stiffness(self, closure=None):
@@ -57,54 +74,63 @@ class TableLaw:
         return float(max(t.kn_tangent.max(), t.kn_secant.max(), t.shear_stiffness.max()))
 
     def step(self, d, closure, spin):
-        """Tractions (3, n) after increments d (3, n); spin (n,) turns the old shear traction."""
-        F, self.K = self.table.step(self.f, self.K, d, closure, spin)
-        self.f = F[1:]
+        """Tractions (3, n) after increments d (3, n); spin (n,) rotates the old shear traction."""
+        F, self.K = self.table.step(self.shear_traction, self.K, d, closure, spin)
+        self.shear_traction = F[1:]
         return F
 
-    def add(self, closure, bonded):
-        """Contacts that came: unsheared joints at this closure (m)."""
+    def add_contacts(self, closure, bonded):
+        """Add new contacts: unsheared joints at this closure (m)."""
         row, w, _ = self.table.locate(closure)
-        self.f = np.concatenate([self.f, np.zeros((2, len(closure)))], axis=1)
+        self.shear_traction = np.concatenate(
+            [self.shear_traction, np.zeros((2, len(closure)))], axis=1
+        )
         self.K = np.concatenate([self.K, self.table.shear_matrix(row, w)], axis=1)
 
-    def keep(self, mask):
-        """Forget the contacts where `mask` is False."""
-        self.f, self.K = self.f[:, mask], self.K[:, mask]
+    def keep_contacts(self, mask):
+        """Remove the contacts for which `mask` is False."""
+        self.shear_traction = self.shear_traction[:, mask]
+        self.K = self.K[:, mask]
 
     def state(self):
-        """Arrays to save."""
-        return {"f": self.f, "K": self.K, "stress": self.table.normal_stress}
+        """Arrays of a checkpoint."""
+        return {"f": self.shear_traction, "K": self.K, "stress": self.table.normal_stress}
 
     def restore(self, data):
-        """Take up such arrays. Raises ValueError if they belong to another table."""
+        """Restore a checkpoint. Raises ValueError if it belongs to another table."""
         if not np.array_equal(data["stress"], self.table.normal_stress):
-            raise ValueError("the state was saved with another table: give TableLaw that one")
-        self.f, self.K = data["f"], data["K"]
+            raise ValueError(
+                "the state was saved with another table: create TableLaw with that table"
+            )
+        self.shear_traction = data["f"]
+        self.K = data["K"]
 
 
 class LiveLaw:
-    """The full path-dependent law: a pool of joints behind the contacts (`jointlaw` importable).
+    """The path-dependent law: a pool with one joint per contact (needs the package `jointlaw`).
 
-    Memory belongs to a contact as long as YADE keeps it, so `Law2...(neverErase=True)` is needed:
-    a sheared joint dilates and carries stress at negative closure. A new contact counts the shear
-    made in touch only. The memory turns with body id1. `law` is a law of jointlaw, or the path of
-    its file. `track_dissipation` sums the dissipated energy, for
-    `batch.dissipated_energy`, at some cost; `pool.places` tell the joints of the contacts there.
+    The history variables exist as long as the interaction in YADE, so `Law2...(neverErase=True)` is
+    required: a sheared joint dilates and carries stress at negative closure. For a new contact only
+    the shear after first touch counts. The frame rotates with body id1.
+
+    law: a law of jointlaw, or the path of its file.
+    track_dissipation: sum up the dissipated energy, for `batch.dissipated_energy`, at some cost;
+        `pool.places` are the places of the contacts in `batch`.
     """
 
     mode = "live"
 
     def __init__(self, law, track_dissipation=False):
-        from jointlaw import JointLaw, JointPool  # table mode does without
+        from jointlaw import JointLaw, JointPool  # not needed in table mode
 
         law = law if hasattr(law, "dim") else JointLaw.from_toml(law)
         if law.dim != 3:
             raise ValueError(
                 "contacts in YADE shear in 3-D: set law.plane=None, closure_only=False"
             )
-        self.law, self.pool = law, JointPool(law, track_dissipation)
-        self.find()
+        self.law = law
+        self.pool = JointPool(law, track_dissipation)
+        self._update_places()
 
     def stiffness(self, closure=None):
         """Upper bound of the stiffness (Pa/m) up to `closure`, closure_range by default."""
@@ -114,47 +140,49 @@ class LiveLaw:
         """Tractions (3, n) after increments d (3, n)."""
         return self.batch.update(d.T, where=self.where, tangent=False)[0].T
 
-    def add(self, closure, bonded):
-        """Contacts that came: virgin joints at this closure (m; negative before touch).
+    def add_contacts(self, closure, bonded):
+        """Add new contacts: virgin joints at this closure (m; negative before touch).
 
         bonded: whether they have the bond of the law.
         """
-        new = self.pool.add([object() for _ in closure])  # keys; contacts are told by their order
+        keys = [object() for _ in closure]  # unique; contacts are identified by their order
+        new = self.pool.add(keys)
         if not bonded:
             self.batch.break_bond(new)
         self.batch.update(np.outer(closure, [1.0, 0.0, 0.0]), where=new, tangent=False)
-        self.find()
+        self._update_places()
 
-    def keep(self, mask):
-        """Forget the contacts where `mask` is False."""
-        self.pool.remove([key for key, kept in zip(self.pool.keys, mask) if not kept])
-        self.find()
+    def keep_contacts(self, mask):
+        """Remove the contacts for which `mask` is False."""
+        self.pool.remove([key for key, keep in zip(self.pool.keys, mask) if not keep])
+        self._update_places()
 
-    def find(self):
-        """Find the joints and the places of all contacts; None if these are all, in order."""
-        self.batch, places = self.pool.batch, self.pool.places
+    def _update_places(self):
+        """Update the batch and the places of all contacts in it; None: all places, in order."""
+        self.batch = self.pool.batch
+        places = self.pool.places
         self.where = None if np.array_equal(places, np.arange(len(self.batch))) else places
 
     def state(self):
-        """Arrays to save."""
+        """Arrays of a checkpoint."""
         state = self.pool.snapshot()
         return {"fingerprint": state.fingerprint, "values": state.values.T}
 
     def restore(self, data):
-        """Take up such arrays. Raises ValueError if another law wrote them."""
+        """Restore a checkpoint. Raises ValueError if another law wrote it."""
         from jointlaw.joints.state import JointState
 
         values = data["values"].T
         self.pool.restore([object() for _ in values], JointState(str(data["fingerprint"]), values))
-        self.find()
+        self._update_places()
 
 
 # ---------------------------------------------------------------- the adapter
 
-# Numbers per contact, shape (n,): ids, step that made it, places of the bodies; radii, area
-# ball: two spheres?; zero: overlap at zero closure
-PER_CONTACT = {int: ["id1", "id2", "made", "b1", "b2"],
-               float: ["R1", "R2", "area", "ball", "zero", "closure"]}  # fmt: skip
+# Numbers per contact, shape (n,). created: iteration in which the interaction became real; b1, b2:
+# places of the bodies in the arrays of bodies; zero_overlap: overlap at zero closure
+PER_CONTACT = {int: ["id1", "id2", "created", "b1", "b2"],
+               float: ["R1", "R2", "area", "both_spheres", "zero_overlap", "closure"]}  # fmt: skip
 VECTORS = ["n", "t2", "c1", "c2", "axis", "plane", "F"]  # shape (3, n)
 
 
@@ -162,50 +190,57 @@ class Joints:
     """A joint law on contacts of the simulation.
 
     law: a `TableLaw` or a `LiveLaw`.
-    area: of one contact in m2: a number, a function of the interaction, or None for the circle of
-        the smaller sphere.
-    select: function of an interaction: is it a joint? Asked once, when the contact is new.
+    area: of one contact in m2: a number, a function of the interaction, or None for the
+        cross-section of the smaller sphere.
+    select: function of an interaction that returns whether it is a joint; called when it forms.
     azimuth: direction of the law's axis 2 in the axes of body id1.
-    plane: None, or the joint's normal in the axes of body id1: contacts then act as pieces of one
-        flat joint (a "smooth joint") whatever the direction between the two spheres.
-    mated: closure counts from the position in which the contact is first seen, not from touch.
-    forget: with neverErase, contacts without force open by more than this (m) are given up.
+    plane: None, or the normal of the joint in the axes of body id1: contacts then are parts of one
+        flat joint (a "smooth joint"), whatever the direction between the two spheres.
+    mated: closure counts from the position in which the contact forms, not from touch.
+    max_opening: with neverErase, opening (m) beyond which a contact without force is deleted.
     """
 
     def __init__(self, law, area=None, select=None, azimuth=(1, 0, 0), plane=None, mated=False,
-                 forget=np.inf, name="joints"):  # fmt: skip
+                 max_opening=np.inf, name="joints"):  # fmt: skip
         if not name.isidentifier():
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
-        self.law, self.select, self.name = law, select, name
+        self.law = law
+        self.select = select
+        self.name = name
         self.area = area if area is None or callable(area) else float(area)
         if not (area is None or callable(area) or 0 < area < np.inf):
             raise ValueError(f"area = {area} m2 must be > 0 and finite")
-        if not forget >= 0:
-            raise ValueError(f"forget = {forget} m must be >= 0")
+        if not max_opening >= 0:
+            raise ValueError(f"max_opening = {max_opening} m must be >= 0")
         self.azimuth = unit(np.reshape(azimuth, (3, 1)).astype(float))
         self.plane = None if plane is None else unit(np.reshape(plane, (3, 1)).astype(float))
-        self.mated, self.forget = mated, forget
-        _running.pop(name, None)  # of an earlier scene
-        self.c = {one: np.zeros(0, kind) for kind, names in PER_CONTACT.items() for one in names}
-        self.c.update({one: np.zeros((3, 0)) for one in VECTORS})
-        self.own, self.others = [], {}  # interactions that are joints; that are not, by `key`
-        self.states = {}  # of bodies with joints, by their ids; None until a loaded scene is there
-        self.x, self.q = np.zeros((3, 0)), np.zeros((4, 0))
-        self.last = None  # O.iter of the last step
-        self.bodies = len(O.bodies)
+        self.mated = mated
+        self.max_opening = max_opening
+        _attached.pop(name, None)  # joints of an earlier scene
+        self.contact_data = {
+            one: np.zeros(0, kind) for kind, names in PER_CONTACT.items() for one in names
+        }
+        self.contact_data.update({one: np.zeros((3, 0)) for one in VECTORS})
+        self.interactions = []
+        self.other_interactions = {}  # not joints, by `interaction_key`
+        self.states = {}  # of bodies with joints, by id; None before the first step after `load`
+        self.x = np.zeros((3, 0))
+        self.q = np.zeros((4, 0))
+        self.last_iteration = None  # O.iter
+        self.body_count = len(O.bodies)
 
     @property
     def F(self):
         """Tractions (3, n) of the last step in the contacts' frames, Pa."""
-        return self.c["F"]
+        return self.contact_data["F"]
 
     def __len__(self):
-        return len(self.c["made"])
+        return len(self.contact_data["created"])
 
     # ------------------------------------------------------------------ set-up
 
     def attach(self):
-        """Put the adapter into O.engines, right after InteractionLoop."""
+        """Insert the adapter into O.engines, right after InteractionLoop."""
         engines = list(O.engines)
         kinds = [type(engine).__name__ for engine in engines]
         if "InteractionLoop" not in kinds:
@@ -216,40 +251,44 @@ class Joints:
                 ".load(file) instead of .attach() to continue a saved run"
             )
         if O.periodic:
-            raise ValueError("O.periodic = True: joints across a periodic boundary are not covered")
+            raise ValueError(
+                "O.periodic = True: joints across a periodic boundary are not supported"
+            )
         if any(k == "GlobalStiffnessTimeStepper" and not e.dead for k, e in zip(kinds, engines)):
             raise ValueError(
-                "GlobalStiffnessTimeStepper sees kn = 0: remove it, set O.dt = joints.time_step()"
+                "GlobalStiffnessTimeStepper reads kn = 0: remove it, set O.dt = joints.time_step()"
             )
         at = kinds.index("InteractionLoop")
         for law2 in engines[at].lawDispatcher.functors:
             if self.law.mode == "live" and not getattr(law2, "neverErase", True):
                 raise ValueError(
-                    f"{type(law2).__name__}.neverErase = False: YADE would drop joints that dilate;"
-                    " set neverErase=True (and forget= here, so that open contacts are given up)"
+                    f"{type(law2).__name__}.neverErase = False: YADE deletes joints that dilate;"
+                    " set neverErase=True (and max_opening= here, to delete open contacts)"
                 )
         runner = PyRunner(
             command=f"import yade_joint; yade_joint.run({self.name!r})",
             iterPeriod=1, initRun=True, label=f"joint_{self.name}",
-            updateGlobals=False,  # else YADE writes the caller's local variables into the globals
+            updateGlobals=False,  # otherwise YADE copies local variables to globals
         )  # fmt: skip
         O.engines = [*engines[: at + 1], runner, *engines[at + 1 :]]
-        _running[self.name] = self
+        _attached[self.name] = self
 
     def time_step(self, safety=0.25, closure=None):
-        """A fixed step (s): `safety` of the shortest stable one over all free spheres.
+        """A fixed time step (s): a fraction `safety` of the stable one of all free spheres.
 
         closure: the largest expected (m); the end of the table or the closure range by default.
-        Every sphere is taken to carry the joints that it has, and six at least. Where `area` is a
-        function, only contacts tell the areas: ValueError before there are any.
+        Each sphere counts with its present joints, or six if it has fewer. If `area` is a function,
+        the areas are known from contacts only: ValueError before the first one.
         """
-        k, shortest = self.law.stiffness(closure), np.inf
+        k = self.law.stiffness(closure)
+        shortest = np.inf
         if callable(self.area) and not len(self):
             raise ValueError(
-                "area is a function, and no contact tells its values yet: call time_step() after "
-                "the first step, or give O.dt"
+                "area is a function, and there is no contact to evaluate it for: call time_step() "
+                "after the first step, or set O.dt"
             )
-        place, areas = np.concatenate([self.c["id1"], self.c["id2"]]), np.tile(self.c["area"], 2)
+        place = np.concatenate([self.contact_data["id1"], self.contact_data["id2"]])
+        areas = np.tile(self.contact_data["area"], 2)
         total = np.bincount(place, areas, minlength=len(O.bodies))
         largest = np.zeros(len(O.bodies))
         np.maximum.at(largest, place, areas)
@@ -259,7 +298,7 @@ class Joints:
                 continue
             one = np.pi * body.shape.radius**2 if self.area is None else largest[body.id] or default
             carried = max(6 * one, total[body.id])
-            # two bodies (2), rolling (1 + m R^2/I = 3.5 for a sphere)
+            # factors: two bodies (2), rolling (1 + m R^2/I = 3.5 for a sphere)
             shortest = min(shortest, 2 * np.sqrt(body.state.mass / (2 * 3.5 * k * carried)))
         if not np.isfinite(shortest):
             raise ValueError("no free sphere in O.bodies: set O.dt by hand")
@@ -270,55 +309,65 @@ class Joints:
     def step(self):
         """Advance all joints; the PyRunner calls this once per step."""
         now = O.iter
-        if self.last is not None and now != self.last + 1:
+        if self.last_iteration is not None and now != self.last_iteration + 1:
             raise RuntimeError(
-                f"joints {self.name!r}: O.iter went from {self.last} to {now}. The adapter must "
-                "run in every step (iterPeriod=1); after O.load call .load(file)"
+                f"joints {self.name!r}: O.iter went from {self.last_iteration} to {now}. "
+                "The adapter must run in every step (iterPeriod=1); after O.load call .load(file)"
             )
-        self._advance(self._find(now))
-        self.last = now
+        self._advance(self._update_contacts(now))
+        self.last_iteration = now
 
     def _advance(self, fresh):
-        """Displacements since the last step, the law's tractions, forces on the bodies.
+        """Compute displacement increments, tractions of the law, and forces on the bodies.
 
-        fresh: places of the new contacts, the last ones.
+        fresh: indices of the new contacts, which are the last ones.
         """
-        c, x0, q0 = self.c, self.x, self.q
-        x, q = self.x, self.q = self._read()
-        b1, b2 = c["b1"], c["b2"]
+        c = self.contact_data
+        x0 = self.x
+        q0 = self.q
+        x, q = self.x, self.q = self._read_bodies()
+        b1 = c["b1"]
+        b2 = c["b2"]
         q1 = q.take(b1, axis=1)
         n, un, c1, c2 = self._geometry(x, q1)
-        closure = un - c["zero"]
+        closure = un - c["zero_overlap"]
         t2 = self._tangent(n, q1)
-        # Displacement of id1 against id2 at the contact, in the frame of mid-step: rigid motion of
-        # the pair, however large and about whatever axis, gives exactly none
-        turn, dx = turned(q, q0), x - x0
-        w1, w2 = turn.take(b1, axis=1), turn.take(b2, axis=1)
+        # displacement of id1 relative to id2 at the contact, in the mean frame of the step: a rigid
+        # motion of the pair, however large, gives exactly zero
+        turn = rotation_vectors(q, q0)
+        dx = x - x0
+        w1 = turn.take(b1, axis=1)
+        w2 = turn.take(b2, axis=1)
         du = dx.take(b1, axis=1) - dx.take(b2, axis=1)
         du += (cross(w1, c1 + c["c1"]) - cross(w2, c2 + c["c2"])) / 2
-        middle, across = unit(n + c["n"]), unit(t2 + c["t2"])
+        middle = unit(n + c["n"])
+        across = unit(t2 + c["t2"])
         d = np.array([closure - c["closure"], dot(du, across), dot(du, cross(middle, across))])
         spin = self._spin(n, t2, w1 + w2) if self.law.mode == "table" else None
         if fresh.size:
             before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
             if self.mated:
-                before, d[:, fresh] = np.zeros(len(fresh)), 0.0
-            self.law.add(before, self.last is None)  # bonds: in the first step
+                before = np.zeros(len(fresh))
+                d[:, fresh] = 0.0
+            self.law.add_contacts(
+                before, self.last_iteration is None
+            )  # bonds in the first step only
             d[0, fresh] = closure[fresh] - before
         F = self.law.step(d, closure, spin)
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
         c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
-        force[:, fresh] -= self._switch_off(fresh)
-        self._apply(force, c1, c2)
-        if self.forget < np.inf:
-            for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
+        force[:, fresh] -= self._remove_yade_force(fresh)
+        self._apply_forces(force, c1, c2)
+        if self.max_opening < np.inf:
+            for k in np.flatnonzero((closure < -self.max_opening) & ~F.any(axis=0)):
                 O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
 
     def _geometry(self, x, q1):
-        """Normal, overlap, and the contact point seen from either centre."""
-        c = self.c
+        """Normal, overlap, and the contact point relative to either centre."""
+        c = self.contact_data
         r = x.take(c["b2"], axis=1) - x.take(c["b1"], axis=1)
-        R1, R2 = c["R1"], c["R2"]
+        R1 = c["R1"]
+        R2 = c["R2"]
         if self.plane is not None:
             n = rotate(q1, c["plane"])
             c1 = r * (R1 / (R1 + R2))
@@ -328,19 +377,21 @@ class Joints:
         un = R1 + R2 - length
         c1 = n * (R1 - un / 2)
         c2 = c1 - r
-        for k in np.flatnonzero(c["ball"] == 0).tolist():
-            geom = self.own[k].geom
-            n[:, k], un[k] = geom.normal.__getinitargs__(), geom.penetrationDepth
+        for k in np.flatnonzero(c["both_spheres"] == 0).tolist():
+            geom = self.interactions[k].geom
+            n[:, k] = geom.normal.__getinitargs__()
+            un[k] = geom.penetrationDepth
             point = np.array(geom.contactPoint.__getinitargs__())
-            c1[:, k], c2[:, k] = point - x[:, c["b1"][k]], point - x[:, c["b2"][k]]
+            c1[:, k] = point - x[:, c["b1"][k]]
+            c2[:, k] = point - x[:, c["b2"][k]]
         return n, un, c1, c2
 
     def _tangent(self, n, q1):
-        """Axis 2: the reference carried by body id1, projected on the contact plane."""
-        c = self.c
+        """Axis 2: the reference direction of body id1, projected on the contact plane."""
+        c = self.contact_data
         a = rotate(q1, c["axis"])
         t2 = a - n * dot(a, n)
-        # rolled so far that the reference is within 30 degrees of the normal: go on with the last
+        # within 30 degrees of the normal, after rolling: continue with the last axis
         steep = np.flatnonzero(dot(t2, t2) < 0.25)
         old = c["t2"][:, steep]
         t2[:, steep] = unit(old - n[:, steep] * dot(old, n[:, steep]))
@@ -348,27 +399,31 @@ class Joints:
         return unit(t2)
 
     def _spin(self, n, t2, w):
-        """Angle by which shear forces turn in the frame: minimal turn of n, mean spin about it."""
-        n0, old = self.c["n"], self.c["t2"]
-        both, share = n + n0, 1 + dot(n, n0)
-        old = old - both * (dot(old, n) / share)
-        twist = 2 * np.arctan(dot(both, w) / (4 * share + dot(w, cross(n0, n))))
+        """Rotation of shear forces in the frame: minimal rotation of n, and mean spin about it."""
+        n0 = self.contact_data["n"]
+        old = self.contact_data["t2"]
+        both = n + n0
+        one_plus_cosine = 1 + dot(n, n0)
+        old = old - both * (dot(old, n) / one_plus_cosine)
+        twist = 2 * np.arctan(dot(both, w) / (4 * one_plus_cosine + dot(w, cross(n0, n))))
         return twist + np.arctan2(dot(old, cross(n, t2)), dot(old, t2))
 
-    def _switch_off(self, fresh):
-        """Switch YADE's own force off; what it is on id1 in this step, which made the contact."""
+    def _remove_yade_force(self, fresh):
+        """Set the stiffness in YADE to zero; returns YADE's forces on id1 in the present step."""
         result = np.zeros((3, len(fresh)))
         for column, k in enumerate(fresh):
-            phys = self.own[k].phys
+            phys = self.interactions[k].phys
             result[:, column] = (-(phys.normalForce + phys.shearForce)).__getinitargs__()
             phys.kn = phys.ks = phys.tangensOfFrictionAngle = 0.0
             phys.shearForce = phys.normalForce = Vector3(0, 0, 0)
         return result
 
-    def _apply(self, force, c1, c2):
-        """Add the forces on id1, their opposites on id2, and their torques to the bodies."""
-        c, size = self.c, len(self.states)
-        torque1, torque2 = cross(c1, force), cross(force, c2)
+    def _apply_forces(self, force, c1, c2):
+        """Add the forces on id1, the opposite forces on id2, and their torques to the bodies."""
+        c = self.contact_data
+        size = len(self.states)
+        torque1 = cross(c1, force)
+        torque2 = cross(force, c2)
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
         turn = [np.bincount(c["b1"], t1, size) + np.bincount(c["b2"], t2, size)
                 for t1, t2 in zip(torque1, torque2)]  # fmt: skip
@@ -379,42 +434,46 @@ class Joints:
 
     # ---------------------------------------------------------------- contacts
 
-    def _find(self, now):
-        """Follow YADE's list of contacts, some of which went, some came; the places of these."""
-        if len(O.bodies) != self.bodies:
-            return self._join(self._match())
-        real = [i.isReal for i in self.own]
+    def _update_contacts(self, now):
+        """Update the joints after YADE's contact detection; returns the indices of new ones."""
+        if len(O.bodies) != self.body_count:
+            return self._create_joints(self._match_by_key())
+        real = [i.isReal for i in self.interactions]
         if not all(real):
-            self._keep(np.array(real))
-        self.others = {one: i for one, i in self.others.items() if i.isReal}
-        missing = O.interactions.countReal() - len(self.own) - len(self.others)
+            self._keep_contacts(np.array(real))
+        self.other_interactions = {one: i for one, i in self.other_interactions.items() if i.isReal}
+        missing = O.interactions.countReal() - len(self.interactions) - len(self.other_interactions)
         new = [i for i in O.interactions.all(True) if i.iterMadeReal == now] if missing else []
-        return self._join(new if len(new) == missing else self._match())
+        return self._create_joints(new if len(new) == missing else self._match_by_key())
 
-    def _match(self):
-        """The slow way: compare with what YADE has, by `key`. New contacts."""
-        real, c = {key(i): i for i in O.interactions.all(True)}, self.c
-        own = list(zip(c["id1"].tolist(), c["id2"].tolist(), c["made"].tolist()))
-        self._keep(np.array([one in real for one in own], bool))
-        self.own = [real.pop(one) for one in own if one in real]
-        self.others = {one: real.pop(one) for one in self.others if one in real}
-        # a body that was erased before the state was saved has no contacts
+    def _match_by_key(self):
+        """Match all interactions by key, which is slow; returns the new ones."""
+        real = {interaction_key(i): i for i in O.interactions.all(True)}
+        c = self.contact_data
+        keys = list(zip(c["id1"].tolist(), c["id2"].tolist(), c["created"].tolist()))
+        self._keep_contacts(np.array([one in real for one in keys], bool))
+        self.interactions = [real.pop(one) for one in keys if one in real]
+        self.other_interactions = {
+            one: real.pop(one) for one in self.other_interactions if one in real
+        }
+        # a body that was erased before the checkpoint has no contacts
         self.states = {k: one or (O.bodies[k] or Body()).state for k, one in self.states.items()}
-        self.bodies = len(O.bodies)
+        self.body_count = len(O.bodies)
         return list(real.values())
 
-    def _keep(self, mask):
-        """Forget the contacts where `mask` is False."""
-        self.c = {key: value[..., mask] for key, value in self.c.items()}
-        self.own = [i for i, keep in zip(self.own, mask) if keep]
-        self.law.keep(mask)
+    def _keep_contacts(self, mask):
+        """Remove the contacts for which `mask` is False."""
+        self.contact_data = {key: value[..., mask] for key, value in self.contact_data.items()}
+        self.interactions = [i for i, keep in zip(self.interactions, mask) if keep]
+        self.law.keep_contacts(mask)
 
-    def _join(self, contacts):
-        """Choose the joints among new contacts, set up what stays constant; their places."""
-        own, rows = [], []
+    def _create_joints(self, contacts):
+        """Create joints for the selected new interactions; returns their indices."""
+        created = []
+        rows = []
         for i in contacts:
             if self.select is not None and not self.select(i):
-                self.others[key(i)] = i
+                self.other_interactions[interaction_key(i)] = i
                 continue
             if not isinstance(i.geom, ScGeom) or type(i.phys) is not FrictPhys:
                 raise TypeError(
@@ -422,50 +481,53 @@ class Joints:
                     f"{type(i.phys).__name__}; joints need ScGeom and FrictPhys (Ip2_FrictMat_"
                     "FrictMat_FrictPhys, Law2_ScGeom_FrictPhys_CundallStrack); select= excludes it"
                 )
-            own.append(i)
-            rows.append((*key(i), *self._radii(i)))
-        fresh = np.arange(len(self), len(self) + len(own))
-        if not own:
+            created.append(i)
+            rows.append((*interaction_key(i), *self._radii(i)))
+        fresh = np.arange(len(self), len(self) + len(created))
+        if not created:
             return fresh
-        self.own += own
-        new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
+        self.interactions += created
+        new = dict(zip(("id1", "id2", "created", "R1", "R2", "both_spheres", "area"), zip(*rows)))
         for k in (*new["id1"], *new["id2"]):
             self.states.setdefault(k, O.bodies[k].state)
         self._add_bodies()
         place = {k: n for n, k in enumerate(self.states)}
         new["b1"], new["b2"] = ([place[k] for k in new[ids]] for ids in ("id1", "id2"))
-        for name, value in self.c.items():
-            more = np.broadcast_to(new.get(name, 0), (*value.shape[:-1], len(own)))
-            self.c[name] = np.concatenate([value, more], axis=-1)
-        self._orient(fresh)
+        for name, value in self.contact_data.items():
+            more = np.broadcast_to(new.get(name, 0), (*value.shape[:-1], len(created)))
+            self.contact_data[name] = np.concatenate([value, more], axis=-1)
+        self._initialise_frames(fresh)
         return fresh
 
-    def _orient(self, fresh):
-        """Reference directions of new contacts in the axes of body id1, and their first frame."""
-        c = self.c
-        x, q = self._read()
+    def _initialise_frames(self, fresh):
+        """Initialise reference directions (in the axes of body id1) and frames of new contacts."""
+        c = self.contact_data
+        x, q = self._read_bodies()
         q1 = q[:, c["b1"]]
         if self.plane is not None:
             r = x[:, c["b2"][fresh]] - x[:, c["b1"][fresh]]
             across = dot(rotate(q1[:, fresh], self.plane), r)
             c["plane"][:, fresh] = self.plane * np.where(across < 0, -1.0, 1.0)
         n, un, c1, c2 = self._geometry(x, q1)
-        n, q1 = n[:, fresh], q1[:, fresh]
+        n = n[:, fresh]
+        q1 = q1[:, fresh]
         a = rotate(q1, self.azimuth)
         t2 = a - n * dot(a, n)
-        bad = dot(t2, t2) < 0.01  # the reference is the normal itself: take the next body axis
+        bad = dot(t2, t2) < 0.01  # the reference is parallel to the normal: use the next body axis
         a[:, bad] = rotate(q1[:, bad], np.roll(self.azimuth, 1))
         t2 = unit(a - n * dot(a, n))
         c["axis"][:, fresh] = rotate(conjugate(q1), t2)
-        c["n"][:, fresh], c["t2"][:, fresh] = n, t2
-        c["c1"][:, fresh], c["c2"][:, fresh] = c1[:, fresh], c2[:, fresh]
+        c["n"][:, fresh] = n
+        c["t2"][:, fresh] = t2
+        c["c1"][:, fresh] = c1[:, fresh]
+        c["c2"][:, fresh] = c2[:, fresh]
         if self.mated or self.plane is not None:
-            c["zero"][fresh] = un[fresh]
+            c["zero_overlap"][fresh] = un[fresh]
 
     def _radii(self, i):
         """Radii, whether both bodies are spheres, and the contact area."""
-        ball = all(isinstance(O.bodies[k].shape, Sphere) for k in (i.id1, i.id2))
-        if self.plane is not None and not ball:
+        both_spheres = all(isinstance(O.bodies[k].shape, Sphere) for k in (i.id1, i.id2))
+        if self.plane is not None and not both_spheres:
             raise TypeError(f"contact {i.id1}-{i.id2}: plane= needs two spheres; see select=")
         if self.area is None:
             area = np.pi * min(i.geom.refR1, i.geom.refR2) ** 2
@@ -473,11 +535,12 @@ class Joints:
             area = float(self.area(i)) if callable(self.area) else self.area
         if not 0 < area < np.inf:
             raise ValueError(f"area = {area} m2 of contact {i.id1}-{i.id2} must be > 0 and finite")
-        return i.geom.refR1, i.geom.refR2, ball, area
+        return i.geom.refR1, i.geom.refR2, both_spheres, area
 
     def _add_bodies(self):
         """Positions of new bodies one step ago, from their velocities (YADE's leapfrog)."""
-        x, q = [], []
+        x = []
+        q = []
         for state in list(self.states.values())[self.x.shape[1] :]:
             angle = state.angVel.norm() * O.dt
             axis = state.angVel.normalized() if angle > 0 else Vector3(0, 0, 1)
@@ -486,7 +549,7 @@ class Joints:
         self.x = np.concatenate([self.x, columns(x, 3)], axis=1)
         self.q = np.concatenate([self.q, columns(q, 4)], axis=1)
 
-    def _read(self):
+    def _read_bodies(self):
         """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
         states = self.states.values()
         return (
@@ -494,29 +557,28 @@ class Joints:
             columns([s.ori.__getinitargs__() for s in states], 4),
         )
 
-    # ------------------------------------------------------------ save and show
+    # ------------------------------------------------------ checkpoints and output
 
     def save(self, path):
-        """Write the adapter's state (NPZ): call it with every O.save, between two runs."""
-        data = {f"contact_{key}": value for key, value in self.c.items()}
+        """Write a checkpoint (NPZ) of the adapter: call it with every O.save, between two runs."""
+        data = {f"contact_{key}": value for key, value in self.contact_data.items()}
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
-        data["others"] = np.array(list(self.others), int)
-        data["last"] = -1 if self.last is None else self.last
+        data["others"] = np.array(list(self.other_interactions), int)
+        data["last"] = -1 if self.last_iteration is None else self.last_iteration
         with open(path, "wb") as file:
             np.savez(file, version=VERSION, ids=list(self.states), x=self.x, q=self.q, **data)
 
     def load(self, path):
-        """Take up a state that `save` wrote: call it after O.load, before the next step.
+        """Restore a checkpoint of `save`: call it after O.load, before the next step.
 
-        Raises ValueError for another version, for a state of live mode loaded into table mode or
-        the other way round, and for another law or table; nothing is changed then.
+        Raises ValueError, without a change, for a file of another version, mode, law or table.
         """
         with np.load(path) as file:
             data = {key: file[key] for key in file.files}
         if data.get("version") != VERSION:
             raise ValueError(
                 f"{path!r} has version {data.get('version')}, this adapter reads {VERSION}: start "
-                "the run anew, or go on with the yade_joint.py that saved it"
+                "the run again, or continue with the yade_joint.py that saved it"
             )
         mode = "live" if "law_fingerprint" in data else "table"
         if mode != self.law.mode:
@@ -526,73 +588,84 @@ class Joints:
                 f"create Joints({law}, ...) and load the file into them"
             )
         self.law.restore({key[4:]: value for key, value in data.items() if key.startswith("law_")})
-        self.own = []
-        self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
-        self.states, self.x, self.q = dict.fromkeys(data["ids"].tolist()), data["x"], data["q"]
-        self.last = int(data["last"]) if data["last"] >= 0 else None
-        self.others = dict.fromkeys(map(tuple, data["others"].reshape(-1, 3).tolist()))
-        self.bodies = -1  # the next step matches these with the scene
-        _running[self.name] = self
+        self.interactions = []
+        self.contact_data = {
+            key[8:]: value for key, value in data.items() if key.startswith("contact_")
+        }
+        self.states = dict.fromkeys(data["ids"].tolist())
+        self.x = data["x"]
+        self.q = data["q"]
+        self.last_iteration = int(data["last"]) if data["last"] >= 0 else None
+        self.other_interactions = dict.fromkeys(map(tuple, data["others"].reshape(-1, 3).tolist()))
+        self.body_count = -1  # forces a match by key in the next step
+        _attached[self.name] = self
 
     def contacts(self):
         """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
-        c = self.c
+        c = self.contact_data
         return {
             "ids": np.array([c["id1"], c["id2"]]).T, "closure": c["closure"].copy(),
             "traction": c["F"].T.copy(), "normal": c["n"].T.copy(), "area": c["area"].copy(),
         }  # fmt: skip
 
     def write_back(self):
-        """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
-        c, F = self.c, self.F
+        """Copy the joint forces to i.phys, for utils.getStress and others, until the next step."""
+        c = self.contact_data
+        F = self.F
         normal = (c["n"] * F[0] * c["area"]).T.tolist()
         shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
-        for i, a, b in zip(self.own, normal, shear):
-            i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
+        for i, a, b in zip(self.interactions, normal, shear):
+            i.phys.normalForce = Vector3(*a)
+            i.phys.shearForce = Vector3(*b)
 
 
 # ------------------------------------------------ contacts, vectors and rotations
 
 
-def key(i):
-    """What tells an interaction from all others, and from an earlier one of the same bodies."""
+def interaction_key(i):
+    """Identifies an interaction, also among successive ones of the same two bodies."""
     return i.id1, i.id2, i.iterMadeReal
 
 
 def columns(rows, size):
-    """Array (size, n) of n rows."""
+    """Array (size, n) from n rows."""
     return np.reshape(rows, (-1, size)).T.copy()
 
 
 def dot(a, b):
+    """Dot products (n,) of vectors (3, n)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a, b):
+    """Cross products (3, n) of vectors (3, n)."""
     return np.array(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
 
 
 def unit(a):
+    """Unit vectors (3, n) in the directions of a."""
     return a / np.sqrt(dot(a, a))
 
 
 def conjugate(q):
+    """Conjugate quaternions (4, n)."""
     return np.array([q[0], -q[1], -q[2], -q[3]])
 
 
 def rotate(q, v):
-    """Vectors v (3, n) turned by the unit quaternions q (4, n)."""
+    """Rotate vectors v (3, n) by unit quaternions q (4, n)."""
     u = q[1:]
     t = 2 * cross(u, v)
     return v + q[0] * t + cross(u, t)
 
 
-def turned(q, old):
+def rotation_vectors(q, old):
     """Rotations from the orientations `old` to `q` as vectors 2 tan(angle/2) axis (3, n).
 
-    With these a rigid turn moves a lever c0 to c1 by exactly turn x (c0 + c1)/2 (Cayley).
+    With these a rigid rotation moves a lever arm c0 exactly to c1 = c0 + rotation x (c0 + c1)/2
+    (Cayley).
     """
     u = old[0] * q[1:] - q[0] * old[1:] + cross(old[1:], q[1:])
     return 2 * u / (q[0] * old[0] + dot(q[1:], old[1:]))

@@ -18,6 +18,7 @@ import numpy as np
 from jointlaw import JointLaw, PathError, direct_shear
 from jointlaw.cli.command import Command, Option, option
 from jointlaw.cli.main import EXIT_INTERRUPTED, EXIT_INVALID_INPUT, Parser
+from jointlaw.support.checks import remedy
 from jointlaw.support.files import SUMMARY, write_json
 from jointlaw.support.pyplot import FORMATS
 from jointlaw.support.version import __version__
@@ -97,8 +98,22 @@ def _parse(words: list[str]) -> argparse.Namespace:
         for names, settings in command.options:
             subparser.add_argument(*names, **settings)
     if words and words[0] not in {*parsers.choices, "-h", "--help", "--version"}:
-        words = ["run", *words]  # a scene, or an option of a run
+        _require_scene(words[0], list(parsers.choices))
+        words = ["run", *words]
     return parser.parse_args(words)
+
+
+def _require_scene(word: str, commands: list[str]) -> None:
+    """Require that the first word, which is no command, is a scene, a file or an option.
+
+    Raises ValueError with the commands and scenes that are spelled like it.
+    """
+    if word in shipped() or word.startswith("-") or Path(word).exists():
+        return
+    if Path(word).suffix:
+        raise ValueError(f"no file {word!r}")
+    names = [*commands, *shipped()]
+    raise ValueError(f"no command or scene {word!r}: {remedy(word, names, 'give one of')}")
 
 
 def _scene_list() -> str:

@@ -2,7 +2,7 @@
 
 In every step
 
-    kinetic + potential + stored + friction + dashpots + dropped - work = start
+    kinetic + potential + stored + friction + dashpots + discarded - external_work = start
 
 holds to rounding for everything that the blocks do, so an error of the balance measures only what
 the joint law gains or loses in a finite step, and contacts that begin or end. It is the check that
@@ -18,8 +18,8 @@ constant values. Joints have a potential of their own, the stored energy, and di
 that they have at the end of the step.
 
 What leaves the balance for good. "friction": energy dissipated by the joints; "dashpots": by
-viscous damping; "dropped": stored energy of contacts that were given up while they still bore load,
-or became shorter.
+viscous damping; "discarded": stored energy of contacts that were removed while they still carried
+load, or became shorter.
 
 `native/blocks.c` adds the entries of each step; this module opens the balance and reads it.
 """
@@ -30,20 +30,20 @@ from ..contact import Joints
 from ..native.layout import ENERGIES
 from .blocks import Blocks
 
-KINETIC, STORED, DROPPED, WORK, TURNED = (
-    ENERGIES.index(name) for name in ("kinetic", "stored", "dropped", "work", "turned")
+KINETIC, STORED, DISCARDED, EXTERNAL_WORK, TURNOVER = (
+    ENERGIES.index(name) for name in ("kinetic", "stored", "discarded", "external_work", "turnover")
 )
 
 
 class EnergyBalance:
-    """Energies in J: kinetic + potential + stored + friction + dashpots + dropped - work = start.
+    """Energies (J) of a run; their sum, external work subtracted, is `start`.
 
-    energy (8,): in the order of `ENERGIES`. work: done by drives, loads and water; turned: sum of
-    the absolute work of gravity, drives and loads, plus the energy at the start, to which errors
-    are related. start: the balance at time 0. forces (3, n, 3) in N: total, dashpots and drives at
-    the end of the last step; previous_forces (2, n, 3): dashpots and drives one step before. area
-    (k,) in m2: of the joints at the end of the last step; booked_dissipation (k,) in J/m2: their
-    dissipated energy, as entered in the balance. The compiled step writes all of these.
+    energy (8,): in the order of `ENERGIES`. external_work: of drives, loads and water; turnover:
+    sum of the absolute work of gravity, drives and loads, plus the energy at the start, to which
+    errors are related. start: the balance at time 0. forces (3, n, 3) in N: total, dashpots and
+    drives at the end of the last step; previous_forces (2, n, 3): dashpots and drives one step
+    before. area (k,) in m2: of the joints at the end of the last step; booked_dissipation (k,) in
+    J/m2: their dissipated energy, as entered in the balance. The compiled step writes all of these.
     """
 
     def __init__(self, blocks: int) -> None:
@@ -61,14 +61,14 @@ class EnergyBalance:
         self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - half_step**2)).sum()
         self.energy[STORED] = self.area @ joints.stored_energy
         self.start = float(self.energy[KINETIC] + self.energy[STORED])
-        self.energy[TURNED] = self.start
+        self.energy[TURNOVER] = self.start
 
     def change_loads(self, blocks: Blocks, change: np.ndarray, dt: float) -> None:
         """Correct the work of loads that change by `change` (n, 3) within a step dt (s).
 
         The step adds the work of the new loads; the trapezoidal rule takes their mean.
         """
-        self.energy[WORK] -= 0.5 * dt * (change * blocks.motion[3:].T).sum()
+        self.energy[EXTERNAL_WORK] -= 0.5 * dt * (change * blocks.motion[3:].T).sum()
 
     @property
     def value(self) -> dict[str, float]:
@@ -78,9 +78,9 @@ class EnergyBalance:
     @property
     def total(self) -> float:
         """The sum (J) that the balance states to be constant."""
-        return float(self.energy[:WORK].sum() - self.energy[WORK])
+        return float(self.energy[:EXTERNAL_WORK].sum() - self.energy[EXTERNAL_WORK])
 
     @property
     def error(self) -> float:
-        """Imbalance as a fraction of the energy turned over."""
-        return (self.total - self.start) / max(float(self.energy[TURNED]), 1e-300)
+        """Imbalance as a fraction of the energy turnover."""
+        return (self.total - self.start) / max(float(self.energy[TURNOVER]), 1e-300)

@@ -8,9 +8,10 @@ rock is at rest. To remove a block at once would release its forces in one step,
 real excavation makes. The forces that the removed blocks exert on the others are therefore kept as
 a load (`Blocks.support`), which is ramped to zero over the release time of the stage. A step in
 which the blocks are removed changes no force on the rest. The joints of removed blocks end; their
-stored energy is entered as dropped, and the support does work as any other load does. A stage waits
-until the support of the one before is gone. At rest are blocks whose velocity and acceleration are
-small: not all of them, for a single loose stone that rattles must not delay an excavation for ever.
+stored energy is entered as discarded, and the support does work as any other load does. A stage
+waits until the support of the previous stage is zero. The rock is at rest when the velocity and the
+acceleration of most blocks are small: not of all, for a single loose stone that rattles must not
+delay an excavation for ever.
 """
 
 import io
@@ -26,7 +27,7 @@ from jointlaw.support.files import write_files
 from ..contact import MAX_SKIN_UNTIL_REBUILD, STATE_PARTS, ContactManager, Contacts, Joints
 from ..scene import Files, Scene, SceneError, parse
 from .blocks import MAX_SKIN_PER_STEP, Blocks, apply_loads
-from .energy_balance import DROPPED, EnergyBalance
+from .energy_balance import DISCARDED, EnergyBalance
 from .equilibrium import create_joints, find_unbalanced, settle
 from .relaxation import Verdict
 from .timestep import MAX_FRACTION_OF_LIMIT, TimeStepLimit, impact_limit
@@ -364,7 +365,7 @@ class Simulation:
         old_row = manager.rebuild(blocks.motion, pairs, keep_closure=False)
         stored_energy = balance.area * joints.stored_energy
         stored_energy[old_row[old_row >= 0]] = 0.0
-        balance.energy[DROPPED] += stored_energy.sum()
+        balance.energy[DISCARDED] += stored_energy.sum()
         balance.area = np.append(balance.area, 0.0)[old_row]
         limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[old_row]
         joints.rearrange(old_row, manager.law, manager.edge_pairs, started=True)
@@ -403,8 +404,8 @@ class Simulation:
             )
             manager.closure_offset[restarted] += closure - new_closure
             balance.booked_dissipation[restarted] = 0.0
-        dropped = old_energy[changed] - new_energy * length[changed]
-        balance.energy[DROPPED] += np.maximum(dropped, 0.0).sum() * thickness
+        discarded = old_energy[changed] - new_energy * length[changed]
+        balance.energy[DISCARDED] += np.maximum(discarded, 0.0).sum() * thickness
 
     # ------------------------------------------------------------------ means over a joint
 

@@ -523,8 +523,8 @@ static void add_energies(dem_step *sim, double dt)
   energy[DEM_STORED] = stored;
   energy[DEM_FRICTION] += friction;
   energy[DEM_DASHPOTS] -= 0.5 * dt * power[0];
-  energy[DEM_WORK] += 0.5 * dt * power[1] + load_work;
-  energy[DEM_TURNED] += turned_over + fabs(0.5 * dt * power[1]);
+  energy[DEM_EXTERNAL_WORK] += 0.5 * dt * power[1] + load_work;
+  energy[DEM_TURNOVER] += turned_over + fabs(0.5 * dt * power[1]);
 }
 
 /* Results of the law, forces, energies, and the velocities of the next step */

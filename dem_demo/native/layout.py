@@ -11,8 +11,15 @@ from typing import NamedTuple
 # Columns of the law's measures for one joint, in the order of `jl.Step.measures`
 MEASURES = ("sliding", "slipping", "separated", "stored_energy", "dissipated_energy", "damage")
 ENERGIES = (
-    "kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned",
-)  # fmt: skip
+    "kinetic",
+    "potential",
+    "stored",
+    "friction",
+    "dashpots",
+    "discarded",
+    "external_work",
+    "turnover",
+)
 
 
 class Constant(NamedTuple):

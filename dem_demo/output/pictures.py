@@ -42,6 +42,7 @@ FRAME_RATE = 11  # 1/s
 ANIMATION_DPI = 75
 FINAL_COST = 4.0  # time to draw the last frame over the time of a frame of the animation: pixels
 MAX_NAMED_BLOCKS = 12  # in a picture with more blocks none bears its name
+MIN_DISTANCE = 1e-6  # m: smaller displacements have no colour and no arrow
 MIN_ARROW = 0.02  # of the largest displacement: smaller ones get no arrow
 MARGIN = 0.07  # of the extent of the blocks
 LINE_WIDTHS = 0.7, 2.0, 1.2  # points: without stress, more at the scale; stress at the limit
@@ -91,7 +92,7 @@ class Pictures:
         self.low = low - margin
         self.high = high + margin
         self.free = np.array([not block.fixed for block in blocks])
-        self.max_distance = max(float(np.nanmax(record.distances[self.free])), 1e-6)
+        self.max_distance = max(float(np.nanmax(record.distances[self.free])), MIN_DISTANCE)
         size = median_size(block for block in blocks if not block.fixed)
         self.arrow_scale = float(f"{0.5 * size / self.max_distance:.0e}")
         is_small = self.max_distance < 0.1
@@ -145,8 +146,9 @@ class Pictures:
         effective = "effective " if scene.wet else ""
         stress_line = {"color": JOINT_STATES["stuck"][0], "lw": self._line_width(stress)}
         entries.append((f"{effective}normal stress {factor * stress:g} {unit}", stress_line))
-        arrow = {"color": "k", "lw": 1.0, "marker": ">"}
-        entries.append((f"displacement, drawn × {self.arrow_scale:g}", arrow))
+        if self.max_distance > MIN_DISTANCE:
+            arrow = {"color": "k", "lw": 1.0, "marker": ">"}
+            entries.append((f"displacement, drawn × {self.arrow_scale:g}", arrow))
         if scene.water:
             entries.append(("water table", {"color": WATER_COLOUR, "ls": "-."}))
         if self.marked.any():

@@ -156,9 +156,11 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
     dt = sim.dt
     end = max(sim.scene.run.end, now) if until is None else until
     steps = (end - now) / dt
-    if not -0.5 <= steps <= MAX_STEPS:
+    if steps < -0.5:
+        raise ValueError(f"until = {end:g} s: must not be before the present time, {now:.6g} s")
+    if not steps <= MAX_STEPS:  # NaN too
         raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "
-                         f"must be from 0 to {MAX_STEPS:g}; units?")  # fmt: skip
+                         f"must be at most {MAX_STEPS:g}; units?")  # fmt: skip
     return round(steps)
 
 

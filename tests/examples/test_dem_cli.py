@@ -33,6 +33,20 @@ def test_without_arguments_the_help_lists_commands_scenes_and_examples(capsys):
     assert re.split(r",\s+", listed) == list(shipped())
 
 
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("strenght-reduction", "did you mean 'strength-reduction'?"),
+        ("slop", "did you mean 'slope'?"),
+        ("xyz", "no command or scene 'xyz': give one of run, new, check"),
+        ("missing.toml", "no file 'missing.toml'"),
+    ],
+)
+def test_an_unknown_command_or_scene_is_named_with_similar_ones(word, message, capsys):
+    assert main([word]) == 2
+    assert message in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
 def test_each_command_has_help_of_its_own_with_an_example(command, capsys):
     text = help_of(capsys, command.name)

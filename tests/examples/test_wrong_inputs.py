@@ -145,7 +145,7 @@ def _files(tmp_path):
         ("dem_demo check long.toml", "until = 1e+06 s: "),
         ("dem_demo check law.toml", "law.toml is the parameter file of a law, no scene"),
         ("dem_demo compare scene.toml", "has no [[rock]] to compare"),
-        ("dem_demo nobodys --out out", "no scene 'nobodys': give a TOML file or one of arch"),
+        ("dem_demo nobodys --out out", "no command or scene 'nobodys': give one of run, new"),
     ],
 )
 def test_error_message_has_one_line_and_names_the_remedy(capsys, command, message):

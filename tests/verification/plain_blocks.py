@@ -185,6 +185,6 @@ def plain_step(sim, velocity, dt):
         "potential": -dt * (blocks.gravity * v).sum(),
         "stored": area @ joints.stored_energy,
         "dashpots": -0.5 * dt * ((balance.previous_forces[0] + dashpots) * v).sum(),
-        "work": drive_work + dt * (blocks.loads * v).sum(),
+        "external_work": drive_work + dt * (blocks.loads * v).sum(),
     }
     return forces, energies, (v + dt * total / blocks.inertia * blocks.is_mobile).T

@@ -28,7 +28,7 @@ def test_sliding_block(law):
     dissipated = [0.0, *steps(sim, 1100, lambda: sim.energy_balance.value["friction"])]
     assert sim.blocks.motion[0, 1] > -0.9
     assert np.diff(dissipated).min() >= -1e-9 * dissipated[-1]
-    assert dissipated[-1] > 0.3 * sim.energy_balance.value["turned"]
+    assert dissipated[-1] > 0.3 * sim.energy_balance.value["turnover"]
     assert abs(sim.energy_balance.error) < 1e-4
 
 
@@ -76,7 +76,7 @@ def test_tumbling_heap():
         energy = sim.energy_balance.value
         most_pressed = max(most_pressed, int((sim.joints.traction[:, 0] > 0).sum()))
         steps_with_duplicates += len(np.unique(codes)) < len(codes)
-        irreversible.append([energy["friction"], energy["dropped"]])
+        irreversible.append([energy["friction"], energy["discarded"]])
         potential.append(energy["potential"])
     assert most_pressed >= 3
     # of two contacts that arrive at one corner, one is dropped in the next step
@@ -130,7 +130,9 @@ dashpot_shear = 0.0
         scene.run.end,
         lambda: (sim.energy_balance.value, sim.manager.closure_offset.max(initial=0)),
     )
-    dropped, stored, work = np.array([[v["dropped"], v["stored"], v["work"]] for v, _ in history]).T
+    dropped, stored, work = np.array(
+        [[v["discarded"], v["stored"], v["external_work"]] for v, _ in history]
+    ).T
     assert stored.max() > 100
     assert dropped[-1] > 100
     assert np.diff(dropped).min() >= 0
@@ -261,7 +263,7 @@ def test_a_new_contact_that_overlaps_starts_without_energy():
     assert sim.contacts.closure.min() > 0.9e-4
     assert sim.manager.closure.max() < 1e-6
     assert sim.energy_balance.value["stored"] == pytest.approx(
-        0.0, abs=1e-6 * sim.energy_balance.value["turned"]
+        0.0, abs=1e-6 * sim.energy_balance.value["turnover"]
     )
 
 

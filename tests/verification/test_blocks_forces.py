@@ -90,7 +90,7 @@ def test_a_compiled_step_agrees_with_plain_numpy(name, steps):
             if entry in energies:
                 is_sum = entry not in ("kinetic", "stored")
                 change = now - before[entry] * is_sum
-                turned = max(sim.energy_balance.value["turned"], 1e-9)
+                turned = max(sim.energy_balance.value["turnover"], 1e-9)
                 assert change == pytest.approx(energies[entry], abs=1e-13 * turned), entry
 
 

@@ -112,9 +112,9 @@ class Flight:
             "stored": 0.0,
             "friction": 0.0,
             "dashpots": 0.0,
-            "dropped": 0.0,
-            "work": work,
-            "turned": at_rest + fallen + work,  # all work is positive
+            "discarded": 0.0,
+            "external_work": work,
+            "turnover": at_rest + fallen + work,  # all work is positive
         }
 
     energy_tolerance = 0.05
@@ -317,9 +317,9 @@ class Stack:
         half_width = self.width / 2
         stored = THICKNESS * half_width * (normal_energy + shear_energy)
         nothing = dict.fromkeys(
-            ("kinetic", "potential", "friction", "dashpots", "dropped", "work"), 0.0
+            ("kinetic", "potential", "friction", "dashpots", "discarded", "external_work"), 0.0
         )
-        return nothing | {"stored": stored, "turned": stored}
+        return nothing | {"stored": stored, "turnover": stored}
 
     energy_tolerance = 1e-4
 
@@ -505,9 +505,9 @@ class Slide:
             "stored": stored,
             "friction": force * max(slid - elastic_slip, 0.0),
             "dashpots": 0.0,
-            "dropped": 0.0,
-            "work": 0.0,
-            "turned": 0.5 * self.mass * self.speed**2 + fallen,
+            "discarded": 0.0,
+            "external_work": 0.0,
+            "turnover": 0.5 * self.mass * self.speed**2 + fallen,
         }
 
     energy_tolerance = 2e-3 * 0.5 * mass * speed**2
@@ -518,7 +518,7 @@ class Slide:
             return 0.0
         slip = self.speed * self.time_step - self.friction * self.stress / self.stiffness
         force = self.friction * THICKNESS * self.box[0] * self.stress
-        return 0.5 * force * slip / self.energies(t)["turned"]
+        return 0.5 * force * slip / self.energies(t)["turnover"]
 
     def monitors(self, t):
         slid, _ = self.at(t)

@@ -273,7 +273,7 @@ def test_work_of_water_on_a_sinking_block_equals_the_loss_of_potential():
         return WATER_UNIT_WEIGHT * wet.area * depth
 
     start = potential()
-    rows = until(sim, 0.7, lambda: (sim.energy_balance.value["work"], start - potential()))
+    rows = until(sim, 0.7, lambda: (sim.energy_balance.value["external_work"], start - potential()))
     work, loss = np.array(rows).T
     assert abs(sim.energy_balance.error) < 1e-12
     assert np.ptp(loss) > 1e4  # J: 2.2 m2 of water lifted by a metre

@@ -10,6 +10,7 @@ from scene_text import block, coulomb
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
+from dem_demo.output.monitors import friction_angle, shear_curve
 from dem_demo.studies.strength import LOG_FACTOR, factor_of_safety
 
 SLOPE = math.radians(35.0)
@@ -41,12 +42,22 @@ def test_blocks_step_a_law_from_outside_the_package():
     assert WEIGHT * math.sin(SLOPE) > CLAY.friction * WEIGHT * math.cos(SLOPE)
 
 
-def test_factor_of_safety_is_that_of_both_strengths():
+def test_factor_of_safety_is_the_sum_of_both_strengths_over_the_load():
     """Friction and the clay's strength, over the weight along the slope."""
     strength = CLAY.friction * WEIGHT * math.cos(SLOPE) + CLAY.clay_strength * 2.0
     expected = strength / (WEIGHT * math.sin(SLOPE))
     factor = factor_of_safety(slab_scene(CLAY))
     assert factor == pytest.approx(expected, rel=1.1 * LOG_FACTOR.tolerance)
+
+
+def test_monitors_include_the_element():
+    """Friction angle and shear curve have the strength of Coulomb's joint and of the clay."""
+    stress = 1e4
+    strength = CLAY.friction * stress + CLAY.clay_strength
+    angle = math.degrees(math.atan(strength / stress))
+    assert friction_angle(CLAY, stress) == pytest.approx(angle, rel=1e-9)
+    record = shear_curve(CLAY, stress, np.array([0.0, 1e-3]))
+    assert record.shear_stress.max() == pytest.approx(strength, rel=1e-9)
 
 
 def test_a_scene_names_its_kind(monkeypatch):

@@ -123,7 +123,7 @@ def _files(tmp_path):
         ),
         (
             "jointlaw export fem law-closure.toml --out out",
-            "law.closure_only = True: finite elements shear",
+            "law.closure_only = True, but finite elements need shear",
         ),
         (
             "jointlaw export fem biegel-rough --seating 0 --out out",

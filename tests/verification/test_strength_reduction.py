@@ -186,7 +186,7 @@ def test_an_interrupted_search_continues(tmp_path, monkeypatch, capsys):
     trials = json.loads((out / "trials.json").read_text())["trials"]
     assert len(trials) == 5  # with the search for unstable blocks and limit analysis
     assert main(command) == 0
-    pattern = r"scene: factor of safety ([\d.]+), critical tilt ([\d.]+)"
+    pattern = r"scene: factor of safety ([\d.]+) .*critical tilt ([\d.]+)"
     factor, tilt = map(float, re.search(pattern, capsys.readouterr().out).groups())
     normal_stress = UNIT_WEIGHT * math.cos(math.radians(DIP))  # Pa, by the slab's weight
     friction = friction_angle(parse(SCENE).laws["rock"], normal_stress)

@@ -264,8 +264,8 @@ def test_an_incomplete_flow_test_is_refused_by_name(options, message, capsys):
 
 # Errors in % at the largest stress, then rms on unloading: of the map, Bandis and a power law
 MEASURED = {
-    "vd1": {"map of the law's closure": (-4, 10), "Bandis": (-10, 19), "power law": (17, 22)},
-    "vd2": {"map of the law's closure": (5, 16), "Bandis": (-10, 56), "power law": (31, 59)},
+    "vd1": {"map of the law's closure": (-6, 12), "Bandis": (-10, 19), "power law": (17, 22)},
+    "vd2": {"map of the law's closure": (6.5, 17), "Bandis": (-10, 56), "power law": (31, 59)},
 }
 
 
@@ -286,7 +286,7 @@ def test_measured_flow_on_unloading_follows_closure(specimen, tmp_path):
 
 @measured_flow
 @pytest.mark.parametrize(
-    ("specimen", "at_largest", "unloading"), [("vd1", 11, 19), ("vd2", 19, 51)]
+    ("specimen", "at_largest", "unloading"), [("vd1", 10, 19), ("vd2", 16, 52)]
 )
 def test_a_law_fitted_to_loading_alone_does_not_predict_unloading(specimen, at_largest, unloading):
     """As far off as Bandis' form: without plastic indentation the joint opens again."""

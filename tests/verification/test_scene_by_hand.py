@@ -661,12 +661,12 @@ def written(request, tmp_path_factory):
     return scene, folder / "out"
 
 
-def compare(found, expected, where):
+def compare(actual, expected, where):
     """Compare columns with pairs (values, tolerance), name by name; no name may be missing."""
-    assert found.keys() == expected.keys(), f"{where}: give every column its value by hand"
+    assert actual.keys() == expected.keys(), f"{where}: give every column its value by hand"
     for name, (values, tolerance) in expected.items():
         np.testing.assert_allclose(
-            found[name], values, rtol=0.0, atol=tolerance, err_msg=f"{where}: {name}"
+            actual[name], values, rtol=0.0, atol=tolerance, err_msg=f"{where}: {name}"
         )
 
 
@@ -682,8 +682,8 @@ def test_files_are_the_known_ones(written):
     scene, folder = written
     frames = [f"vtk/{kind}_{i:04d}.vtu" for kind in ("blocks", "joints") for i in range(3)]
     tables = ["history.csv", "blocks.csv", "summary.json", "vtk/blocks.pvd", "vtk/joints.pvd"]
-    found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert found == {*frames, *tables, "state/state.npz"}
+    actual = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert actual == {*frames, *tables, "state/state.npz"}
     for kind in ("blocks", "joints"):
         listed = list(ElementTree.parse(folder / "vtk" / f"{kind}.pvd").iter("DataSet"))
         times = [float(entry.get("timestep")) for entry in listed]
@@ -693,10 +693,11 @@ def test_files_are_the_known_ones(written):
 
 def test_every_column_of_history(written):
     scene, folder = written
-    found = columns(folder / "history.csv")
-    np.testing.assert_allclose([float(t) for t in found["time_s"]], scene.times, atol=1e-12)
+    actual = columns(folder / "history.csv")
+    np.testing.assert_allclose([float(t) for t in actual["time_s"]], scene.times, atol=1e-12)
     rows = [
-        dict(zip(found, map(float, row), strict=True)) for row in zip(*found.values(), strict=True)
+        dict(zip(actual, map(float, row), strict=True))
+        for row in zip(*actual.values(), strict=True)
     ]
     for t, row in zip(scene.times, rows, strict=True):
         energies = {f"{k}_J": (v, scene.energy_tolerance) for k, v in scene.energies(t).items()}
@@ -706,9 +707,9 @@ def test_every_column_of_history(written):
 
 def test_every_column_of_blocks(written):
     scene, folder = written
-    found = columns(folder / "blocks.csv")
-    assert found.pop("block") == scene.block_names
-    numbers = {name: [float(text) for text in texts] for name, texts in found.items()}
+    actual = columns(folder / "blocks.csv")
+    assert actual.pop("block") == scene.block_names
+    numbers = {name: [float(text) for text in texts] for name, texts in actual.items()}
     compare(numbers, scene.blocks(), "blocks.csv")
 
 
@@ -717,11 +718,11 @@ def test_every_field_of_blocks_in_vtk(written):
     scene, folder = written
     mesh = meshio.read(folder / "vtk" / "blocks_0002.vtu")
     assert not mesh.point_data
-    found = {name: np.concatenate(parts) for name, parts in mesh.cell_data.items()}
+    actual = {name: np.concatenate(parts) for name, parts in mesh.cell_data.items()}
     first, second, along = (
-        found.pop(name) for name in ("stress_1_Pa", "stress_2_Pa", "along_stress_1_Pa")
+        actual.pop(name) for name in ("stress_1_Pa", "stress_2_Pa", "along_stress_1_Pa")
     )
-    compare(found, scene.cells(), "blocks.vtu")
+    compare(actual, scene.cells(), "blocks.vtu")
     tensors, tolerance = scene.stresses()
     for tensor, one, two, vector in zip(tensors, first, second, along, strict=True):
         if tensor is None:
@@ -761,14 +762,14 @@ def test_every_field_of_joints_in_vtk(written):
     order = np.lexsort([x, y.round(2)])
     ends = np.take_along_axis(ends, ends[..., :1].argsort(axis=1), axis=1)[order, :, :2]
     np.testing.assert_allclose(ends, segments, atol=tolerance)
-    found = {name: part[order] for name, (part,) in mesh.cell_data.items()}
-    compare(found, scene.joints(), "joints.vtu")
+    actual = {name: part[order] for name, (part,) in mesh.cell_data.items()}
+    compare(actual, scene.joints(), "joints.vtu")
 
 
 def test_every_key_of_summary(written):
     scene, folder = written
-    found = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)
-    assert 0 < found.pop("wall_time_s") < np.inf
+    actual = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)
+    assert 0 < actual.pop("wall_time_s") < np.inf
     energies = scene.energies(scene.times[-1])
     errors = [scene.energy_error(t) for t in scene.times]
     expected = scene.summary() | {
@@ -783,4 +784,4 @@ def test_every_key_of_summary(written):
         "stopped": None,
         "files": ["history.csv", "blocks.csv"],
     }
-    assert found == expected
+    assert actual == expected

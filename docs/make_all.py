@@ -77,10 +77,6 @@ PARTS = {
     "impacts": Part("docs/measure/test_figures.py impacts", quoted_in="limits.md"),
     "angle-sum": Part("docs/measure/random_laws.py angle-sum", quoted_in="limits.md"),
     "energy-gain": Part("docs/measure/energy_gain.py", quoted_in="limits.md theory-incremental.md"),
-    "energy-gain-of-one-law": Part(
-        "docs/measure/energy_gain.py --laws 1 --first 1138 --generations 150 --population 20",
-        quoted_in="limits.md",
-    ),
     # blocks.md
     "shaken-slab": Part("docs/measure/blocks.py shaken-slab", quoted_in="blocks.md"),
     # water.md, blocks.md

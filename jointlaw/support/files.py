@@ -75,8 +75,10 @@ def clear_run(folder: Path, patterns: Iterable[str] = ()) -> None:
     make_folder(folder)
     paths = [folder / SUMMARY]
     with contextlib.suppress(OSError, ValueError):  # an interrupted run has no summary
-        listed = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["files"]
-        paths += [folder / Path(name).name for name in listed]
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        listed = summary.get("files") if isinstance(summary, dict) else None
+        names = listed if isinstance(listed, list) else []  # a summary of another program
+        paths += [folder / Path(name).name for name in names if isinstance(name, str)]
     subfolders = set[str]()
     for pattern in patterns:
         paths += folder.glob(pattern)

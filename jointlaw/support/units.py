@@ -41,12 +41,18 @@ def parse(text: str, unit: str) -> float:
 
     Raises ValueError naming the text, the unit and an example.
     """
-    match = _PATTERN.fullmatch(text)
-    if match and (match[2] or unit) in _FACTORS[unit]:
-        return float(match[1]) * _FACTORS[unit][match[2] or unit]
+    number, given_unit = _split(text)
+    if number and (given_unit or unit) in _FACTORS[unit]:
+        return float(number) * _FACTORS[unit][given_unit or unit]
     raise ValueError(
         f"{text!r} is not a quantity in {unit}; write a number in {unit} or 10{COMMON[unit]}"
     )
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Number and unit of a quantity, as text; both are empty for other text."""
+    match = _PATTERN.fullmatch(text)
+    return (match[1], match[2]) if match else ("", "")
 
 
 def parse_option(text: str, unit: str, *, positive: bool = False) -> float:
@@ -61,7 +67,7 @@ def parse_option(text: str, unit: str, *, positive: bool = False) -> float:
     short = text.strip()
     if math.isinf(value):
         raise ValueError(f"{text} is not finite; give a finite number")
-    if value and short[-1] in "0123456789.":
+    if value and not _split(text)[1]:
         raise ValueError(
             f"{short} has no unit: write for example {short}{COMMON[unit]}, or {short}{unit}"
         )

@@ -325,6 +325,8 @@ def test_invalid_quantities(text, unit):
 def test_options_need_a_unit():
     assert units.parse_option("0", "Pa") == 0.0
     assert units.parse_option("5MPa", "Pa", positive=True) == 5e6
+    assert units.parse_option("100cm2", "m2") == pytest.approx(1e-2)  # the unit ends in a digit
+    assert units.parse_option("2 N/mm2", "Pa") == pytest.approx(2e6)
     for text, message in (("5", "write for example 5MPa"), ("0", "> 0 Pa"), ("1e400Pa", "finite")):
         with pytest.raises(ValueError, match=message):
             units.parse_option(text, "Pa", positive=True)

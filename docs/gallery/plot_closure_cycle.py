@@ -52,14 +52,14 @@ plt.show()
 
 law = jl.JointLaw(
     orientation=jl.Orientation(3.0),
-    asperity=jl.Asperity(K=9.637e8, lam=1.167, eta=0.5, mu=0.6, yield_interference=78.5e-6),
-    heights=jl.GammaHeights(2.048, 53.3e-6, 0.0, "individual"),
-    asperity_density=1.658e4,
+    asperity=jl.Asperity(K=9.637e8, lam=1.167, eta=0.5, mu=0.6, yield_interference=78.7e-6),
+    heights=jl.GammaHeights(1.938, 61.2e-6, 0.0, "individual"),
+    asperity_density=1.893e4,
     closure_only=True,
 )
 elastic = replace(law, asperity=replace(law.asperity, yield_interference=np.inf))
 stress, closure = datasets.load("grimsel_vd1_closure")
-preload_closure = 70.4e-6  # m, closure of the law where the test starts
+preload_closure = 71.9e-6  # m, closure of the law where the test starts
 
 figure, axis = plt.subplots(layout="constrained")
 axis.plot(closure * 1e6, stress / 1e6, "ko", ms=4, label="measured")

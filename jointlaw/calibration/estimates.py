@@ -13,7 +13,7 @@ not end at a bound. Two cases need more than the covariance:
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,10 +23,18 @@ from numpy.typing import ArrayLike
 from ..laws.joint_law import JointLaw
 from ..support.checks import Array, one_of
 from .forward import build_law, log_stress
-from .measured import ShearCurve, simulate_curves
+from .measured import MIN_CLOSURE_POINTS, ShearCurve, simulate_curves
 from .noise import Series
 from .priors import TRANSFORMS, Values
-from .problem import QUANTILE, Problem, Solution, central_differences
+from .problem import (
+    CLOSURE_PARAMETERS,
+    QUANTILE,
+    Problem,
+    Solution,
+    central_differences,
+    solve,
+    starting_points,
+)
 from .shearing import SimulatedTest
 
 MAX_AUTOCORRELATED_MISFIT = 1.5  # of the expected noise: with more the shape of the law differs
@@ -36,7 +44,9 @@ MAX_ERROR = 0.5  # standard error of a parameter without a logarithm
 UNBOUNDED_RATIO = 1e6  # upper over lower end of an interval that is reported as unbounded
 MIN_SOFTENING_POINTS = 3  # of one test, while a bond softens, to determine its cohesion
 BOUND_MARGIN = 1e-6  # of the distance of the bounds
-SMALL_VALUE = 0.01  # of the largest stress or opening: larger ones have logarithmic bands
+SMALL_STRESS = 0.01  # of the largest shear stress: larger ones have logarithmic bands
+EXTRAPOLATION_FACTOR = 2.0  # of the miss of the last third, see `Estimates.extrapolation_error`
+MIN_EXTRAPOLATION_POINTS = 6  # of a closure curve
 CURVE_QUANTITIES = ("stress", "opening")
 TRADE_OFF = ("mu", "a")  # friction and slopes, which shear stress alone cannot separate
 
@@ -234,14 +244,16 @@ class Estimates:
         """
         curve = min(self.problem.shears, key=lambda one: np.mean(one.normal))
 
-        def log_dilation(values: Values) -> Array:
+        def dilation(values: Values) -> Array:
             (test,) = simulate_curves([curve], values, self.problem.settings)
-            with np.errstate(invalid="ignore"):
-                return np.log([test.dilation])
+            return np.array([test.dilation])
 
         opening = self.shear_band(curve)[1]
         largest = opening[:, np.argmax(opening[1])]
-        return np.stack([largest, np.exp(self._confidence_band(log_dilation))[:, 0]], axis=1)
+        interval = self._confidence_band(dilation)[:, 0]
+        if interval.mean() <= 0:
+            interval = np.full(2, np.nan)
+        return np.stack([largest, np.maximum(interval, 0.0)], axis=1)
 
     def predict_shear(self, *curves: ShearCurve) -> list[SimulatedTest]:
         """Simulate tests with the fitted law."""
@@ -251,35 +263,85 @@ class Estimates:
         """95 % confidence band (2, n), low and high, in Pa of the curve `predict`.
 
         It follows from the covariance of the parameters. It is no prediction band: the noise of a
-        further point is not included, nor the difference between the law and rock, which matters
-        most beyond the largest fitted stress.
+        further point is not included. Beyond the largest fitted closure it is wider by
+        `extrapolation_error`.
 
         closure: in m, (n,), with the origin of the closure test.
         """
         u = np.atleast_1d(np.asarray(closure, float))
         settings = self.problem.settings
-        log_band = self._confidence_band(
+        low, high = self._confidence_band(
             lambda values: log_stress(values, values["preload_closure"] + u, settings)
         )
-        return np.exp(log_band)
+        centre = (low + high) / 2
+        half_width = np.hypot((high - low) / 2, self.extrapolation_error(u))
+        return np.exp(np.stack([centre - half_width, centre + half_width]))
+
+    def extrapolation_error(self, closure: ArrayLike) -> Array:
+        """Error (n,) of the logarithm of the stress beyond the fitted closure test, 95 %.
+
+        No law is exactly that of the rock, and the difference grows beyond the data. It is measured
+        with the data: the last third of the fitted points is predicted from the others. The error
+        is twice the root mean square of the larger half of that distance, and grows with the root
+        of the distance from the last point, over the last third. Zero within the data, and for
+        cycles or fewer than six points.
+
+        closure: in m, (n,), with the origin of the closure test.
+        """
+        u = np.atleast_1d(np.asarray(closure, float))
+        if self._extrapolation is None:
+            return np.zeros(u.size)
+        miss, start, end = self._extrapolation
+        distance = np.maximum(u - end, 0.0) / (end - start)
+        return np.asarray(EXTRAPOLATION_FACTOR * miss * np.sqrt(distance))
+
+    @cached_property
+    def _extrapolation(self) -> tuple[float, float, float] | None:
+        """Miss of the last third of the closure curve, and the closures (m) at its ends."""
+        curve = self.problem.closure
+        if curve is None or curve.cycle or curve.stress.size < MIN_EXTRAPOLATION_POINTS:
+            return None
+        free = tuple(name for name in self.free if name in CLOSURE_PARAMETERS)
+        if not free:
+            return None
+        n = max(math.ceil(2 * curve.stress.size / 3), MIN_CLOSURE_POINTS)
+        part = replace(
+            self.problem,
+            closure=curve.up_to(n),
+            shears=(),
+            free=free,
+            values=self.parameters,
+        )
+        values = part.unpack(solve(part, starting_points(part, has_law=True)).x)
+        rest = slice(n, None)
+        closure = values["preload_closure"] + curve.closure[rest]
+        predicted = log_stress(values, closure, self.problem.settings)
+        misses = predicted - np.log(curve.stress[rest])
+        last = misses[-max(1, misses.size // 2) :]
+        return (
+            float(np.sqrt(np.mean(last**2))),
+            float(curve.closure[n - 1]),
+            float(curve.closure[-1]),
+        )
 
     def shear_band(self, curve: ShearCurve) -> Array:
         """95 % confidence bands of shear stress (Pa) and opening (m) of a test.
 
-        Computed for arcsinh(value / small), which is a logarithm for large values and allows small
-        values to change their sign.
+        The band of the stress is that of arcsinh(stress/small), which is a logarithm for large
+        stresses and allows small ones to change their sign. The opening, a sum of dilation and
+        compression, may have any sign: its band is linear.
 
         Returns low and high of each, (2, 2, rows).
         """
 
         def model(values: Values) -> Array:
             (test,) = simulate_curves([curve], values, self.problem.settings)
-            return np.stack([test.stress, test.opening])
+            return np.stack([np.arcsinh(test.stress / small), test.opening])
 
-        largest = np.abs(model(self.parameters)).max(axis=1, keepdims=True)
-        small = np.maximum(SMALL_VALUE * largest, 1e-300)
-        band = self._confidence_band(lambda values: np.arcsinh(model(values) / small))
-        return (small * np.sinh(band)).swapaxes(0, 1)
+        (fitted,) = self.predict_shear(curve)
+        small = max(SMALL_STRESS * float(np.max(np.abs(fitted.stress))), 1e-300)
+        stress, opening = self._confidence_band(model).swapaxes(0, 1)
+        return np.stack([small * np.sinh(stress), opening])
 
     def _confidence_band(self, model: Callable[[Values], Array]) -> Array:
         """The 95 % confidence band, low and high, of a function of the parameters."""

@@ -1,6 +1,7 @@
 """Measured curves: their data, expected noise, and residuals of a law."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -18,6 +19,7 @@ from .priors import Values
 from .shearing import ShearPath, SimulatedTest, simulate_shear
 
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
+LOAD_CELL_NOISE = 0.005  # of the largest stress: load cells are graded by their full scale
 CLOSURE_NOISE = 0.005  # of the largest closure: linearity and repeatability of a transducer
 SHEAR_NOISE = 0.02  # of the largest shear stress
 OPENING_NOISE = 0.03  # of the largest opening: a gauge beside a joint that tilts slightly
@@ -49,8 +51,8 @@ class ClosureCurve:
     closure: closure in m, (n,), from any origin. Unloading is left out (see `first_loading`) unless
         `cycle`.
     noise: known standard error of the stress relative to it; the closure is then taken as exact.
-        None expects 1 % of the stress and 0.5 % of the largest closure, and estimates both from the
-        residuals.
+        None expects 1 % of the stress with 0.5 % of the largest stress, and 0.5 % of the largest
+        closure, and estimates the levels of both from the residuals.
     cycle: True for whole cycles of loading, unloading and reloading in their order. Only a law with
         a yield_interference has a hysteresis loop to fit to them.
     compliance: of rock and machine, whose deformation the test measured too: closure per stress in
@@ -151,7 +153,19 @@ class ClosureCurve:
             "normal stress": np.full(stress.size, STRESS_NOISE),
             "closure": closure_error * scaled_slope,
         }
+        if not self.cycle:
+            errors["load cell"] = LOAD_CELL_NOISE * np.max(stress) / stress
         return Series("closure", "stress", errors)
+
+    def up_to(self, n: int) -> Self:
+        """The first n points of this test, with the same origin of the closure."""
+        shorter = copy(self)
+        object.__setattr__(shorter, "stress", self.stress[:n])
+        object.__setattr__(shorter, "closure", self.closure[:n])
+        object.__setattr__(
+            shorter, "series", (shorter._make_series(self.stress[:n], self.closure[:n]),)
+        )
+        return shorter
 
     def residuals(self, values: Values, settings: Settings) -> Array:
         """ln(model/measured), (n,); over cycles (model - measured)/largest measured stress.

@@ -12,21 +12,30 @@ tests make the residuals of a fit differ from independent noise of known level:
   the joint by independent normal deviates with one standard deviation, the spread. Without it, many
   points of two specimens would determine the joint far too well.
 
-The residuals of test k then have the covariance
+The residuals r_k of test k, with the derivative J_k by the parameters, then have the covariance
 
-    V_k = S_k R(rho) S_k + spread^2 J_k J_k',
+    V_k = S_k R(rho) S_k + J_k T J_k',
 
-with the diagonal matrix S_k of standard errors and the derivative J_k of the residuals by the
-logarithms of the parameters. Level, rho and spread (the hyperparameters) have priors, and for each
-point of a grid of them the posterior of the parameters x is normal near the present ones: with
-A = sum J_k' V_k^-1 J_k + L and b = sum J_k' V_k^-1 r_k + b_0 its mean is x - A^-1 b and its
-covariance A^-1 (L and b_0 come from the priors of the parameters). The weight of a grid point is
-its restricted likelihood, exp(-(sum (ln|V_k| + r_k' V_k^-1 r_k) + ln|A| - b' A^-1 b)/2), which
-allows for the part of the noise that the parameters follow. Averages over the grid give the result:
-the covariance of x is the mean of A^-1 plus the covariance of the means.
+where S_k are the standard errors and T is the diagonal matrix of spread^2 for logarithms of
+parameters and 0 for others. Level, rho and spread (the hyperparameters) have priors. The weight of
+a point of a grid of them is its restricted likelihood, which allows for the part of the noise that
+the parameters follow: with A = sum J_k' V_k^-1 J_k + L and b = sum J_k' V_k^-1 r_k + b_0 it is
 
-V_k^-1 is never formed. With T = spread^2 for logarithms of parameters and 0 for others, and the
-information M_k = J_k' (S R S)^-1 J_k of a test alone, J_k' V_k^-1 J_k = M_k (I + T M_k)^-1.
+    exp(-(sum (ln|V_k| + r_k' V_k^-1 r_k) + ln|A| - b' A^-1 b)/2)
+
+(L and b_0 come from the priors of the parameters).
+
+**The estimate does not use the correlation.** With V_k as weights, a fit would follow differences
+of neighbouring residuals and ignore large smooth misfits, which are noise to it: a law of another
+shape then misses the measured stresses by far. The weights of the estimate are independent,
+W_k = S_k^2 + J_k T J_k'. Its covariance with residuals of covariance V_k is (sandwich estimator)
+
+    C = A_0^-1 (sum J_k' W_k^-1 V_k W_k^-1 J_k + L) A_0^-1,  A_0 = sum J_k' W_k^-1 J_k + L.
+
+The mean of C over the grid plus the covariance of the estimates is the covariance of the result.
+
+V_k^-1 is never formed: with the information M_k = J_k' (S R S)^-1 J_k of a test alone,
+J_k' V_k^-1 J_k = M_k (I + T M_k)^-1.
 
 A residual that no noise can change must not be counted: the first row of a shear test is zero by
 construction.
@@ -41,13 +50,17 @@ import numpy as np
 from ..support.checks import Array
 
 LEVEL_FACTOR = 4.0  # the 95 % range of a level is from 1/4 to 4 times the expected one
-MAX_LEVEL_FACTOR = 10.0  # largest and smallest level relative to the expected one, either way
+# The same for a load cell far below its full scale, where some are much better than their grade
+LEVEL_FACTORS = {"load cell": 30.0}
 AUTOCORRELATIONS = np.array([0.0, 0.3, 0.6, 0.8, 0.9, 0.96])  # grid of rho
 INDEPENDENCE = 0.4  # prior probability of rho = 0; all others are equally probable
 SPREADS = np.array([0.0, 0.02, 0.04, 0.08, 0.16])  # grid of the spread, equally probable
-_LEVEL_SD = np.log(LEVEL_FACTOR) / 1.96
-# standard deviations of the logarithm of a level: a normal density is integrated within 1 %
+# Standard deviations of the logarithm of a level. A normal density on the first has its standard
+# deviation within 1 %, on the second, for more than `MAX_FINE_LEVELS`, within 5 %
 _LEVEL_GRID = np.linspace(-2.6, 2.6, 5)
+_COARSE_LEVEL_GRID = np.sqrt(3.0) * np.array([-1.0, 0.0, 1.0])
+MAX_FINE_LEVELS = 3
+_MAX_LEVEL = 3.3  # standard deviations of the prior
 _MIN_LEVEL_SD = 0.05  # of the logarithm: a narrower grid is not needed
 _MIN_PROBABILITY = 1e-3  # of a value of rho or of the spread that stays on the grid
 
@@ -139,16 +152,15 @@ class Posterior(NamedTuple):
 
     step: change of the parameters to their posterior mean, (p,).
     covariance: (p, p).
-    conditional_covariance: mean of the covariances for given hyperparameters, (p, p).
-    information: mean information of data and prior, (p, p).
+    prior_weight: mean of A_0^-1, (p, p), the derivative of the estimate by the gradient of the
+        prior.
     noise: posterior of the hyperparameters.
     mode: the most probable hyperparameters.
     """
 
     step: Array
     covariance: Array
-    conditional_covariance: Array
-    information: Array
+    prior_weight: Array
     noise: NoiseEstimate
     mode: Hyperparameters
 
@@ -168,7 +180,7 @@ def prior_estimate(series: Sequence[Series], has_specimens: bool) -> NoiseEstima
     spreads = SPREADS if has_specimens else np.zeros(1)
     return NoiseEstimate(
         expected,
-        dict.fromkeys(keys, _LEVEL_SD),
+        {source: _level_sd(source) for source in keys},
         dict.fromkeys(tests, AUTOCORRELATIONS),
         spreads,
     )
@@ -187,44 +199,71 @@ def estimate_posterior(
     previous: an earlier estimate, about which the grid of the levels is centred.
     """
     grid = _Grid(previous)
-    spread_variance = grid.spread[..., None] ** 2 * varies
-    information = prior.information
-    gradient = prior.gradient
+    T = grid.spread[..., None] ** 2 * varies
+    A = prior.information
+    b = prior.gradient
+    working_A = prior.information
+    working_b = prior.gradient
+    filling = prior.information
     deviance = np.zeros(())
     for test in tests:
-        M, v, q, log_determinant = _sum_series(test, grid)
-        if previous.has_specimens:
-            B = np.eye(varies.size) + spread_variance[..., :, None] * M
-            K = np.linalg.inv(B)
-            q = q - np.einsum("...p,...pq,...q,...q->...", v, K, spread_variance, v)
-            v = np.einsum("...qp,...q->...p", K, v)
-            M = M @ K
-            log_determinant = log_determinant + np.linalg.slogdet(B)[1]
-        information = information + M
-        gradient = gradient + v
-        deviance = deviance + q + log_determinant
-    C = np.asarray(np.linalg.inv(information), np.float64)
-    steps: Array = -np.einsum("...pq,...q->...p", C, gradient)
-    deviance = deviance + np.linalg.slogdet(information)[1]
-    deviance = deviance + np.einsum("...p,...p->...", gradient, steps)
+        terms = _sum_series(test, grid)
+        shared = _with_spread(terms.M, terms.v, T)
+        A = A + shared.M
+        b = b + shared.v
+        deviance = deviance + terms.q - shared.reduction + terms.log_determinant
+        deviance = deviance + shared.log_determinant
+        working = _with_spread(terms.working_M, terms.working_v, T)
+        working_A = working_A + working.M
+        working_b = working_b + working.v
+        # W^-1 J = J_white K, so that J' W^-1 V W^-1 J = K' (G + M T M) K
+        inner = terms.G + terms.working_M @ (T[..., :, None] * terms.working_M)
+        filling = filling + np.swapaxes(working.K, -1, -2) @ inner @ working.K
+    deviance = deviance + np.linalg.slogdet(A)[1]
+    deviance = deviance - np.einsum("...p,...p->...", b, np.linalg.solve(A, b[..., None])[..., 0])
     weight = grid.weights(deviance)
+    inverse = np.asarray(np.linalg.inv(working_A), np.float64)
+    steps: Array = -np.einsum("...pq,...q->...p", inverse, working_b)
     step = grid.mean(weight, steps, 1)
     deviation = steps - step
     products = np.asarray(deviation[..., :, None] * deviation[..., None, :], np.float64)
-    between = grid.mean(weight, products, 2)
-    conditional_covariance = grid.mean(weight, C, 2)
+    conditional_covariance = grid.mean(weight, inverse @ filling @ inverse, 2)
     return Posterior(
         step=step,
-        covariance=conditional_covariance + between,
-        conditional_covariance=conditional_covariance,
-        information=grid.mean(weight, information, 2),
+        covariance=conditional_covariance + grid.mean(weight, products, 2),
+        prior_weight=grid.mean(weight, inverse, 2),
         noise=grid.estimate(weight),
         mode=grid.point(np.unravel_index(int(np.argmax(weight)), weight.shape)),
     )
 
 
+class _Shared(NamedTuple):
+    """Terms of a test with the spread between specimens, on the grid.
+
+    M, v: J' V^-1 J (..., p, p) and J' V^-1 r (..., p).
+    K: (I + T M)^-1, (..., p, p).
+    reduction: of r' V^-1 r by the spread.
+    log_determinant: increase of ln|V| by the spread.
+    """
+
+    M: Array
+    v: Array
+    K: Array
+    reduction: Array
+    log_determinant: Array
+
+
+def _with_spread(M: Array, v: Array, T: Array) -> _Shared:
+    """Add the spread between specimens, of variances T (..., p), to the terms of a test."""
+    B = np.eye(M.shape[-1]) + T[..., :, None] * M
+    K = np.asarray(np.linalg.inv(B), np.float64)
+    reduction = np.einsum("...p,...pq,...q,...q->...", v, K, T, v)
+    shared_v = np.einsum("...qp,...q->...p", K, v)
+    return _Shared(M @ K, shared_v, K, reduction, np.linalg.slogdet(B)[1])
+
+
 def misfit(tests: Sequence[LinearTest], hyperparameters: Hyperparameters, varies: Array) -> float:
-    """The sum over tests of r' V^-1 r for given hyperparameters.
+    """The sum over tests of r' W^-1 r for given hyperparameters.
 
     Parameters
     ----------
@@ -233,44 +272,38 @@ def misfit(tests: Sequence[LinearTest], hyperparameters: Hyperparameters, varies
     varies: as in `estimate_posterior`.
     """
     total = 0.0
-    variance = hyperparameters.spread**2 * varies
+    T = hyperparameters.spread**2 * varies
     for test in tests:
-        M = np.zeros((varies.size, varies.size))
-        v = np.zeros(varies.size)
-        for series, residual, J in zip(*test, strict=True):
-            z = _whiten(residual, series, hyperparameters)
-            H = _whiten(J, series, hyperparameters)
-            M += H.T @ H
-            v += H.T @ z
+        M, v = _working_terms(test, hyperparameters)
+        for series, residual in zip(test.series, test.residuals, strict=True):
+            z = residual / series.sigma(hyperparameters.levels)
             total += float(z @ z)
-        K = np.linalg.inv(np.eye(varies.size) + variance[:, None] * M)
-        total -= float(v @ K @ (variance * v))
+        total -= float(_with_spread(M, v, T).reduction)
     return total
 
 
 def parameter_gain(
-    tests: Sequence[LinearTest], C: Array, hyperparameters: Hyperparameters, varies: Array
+    tests: Sequence[LinearTest], prior: Prior, hyperparameters: Hyperparameters, varies: Array
 ) -> Array:
     """Derivative (p, n) of fitted parameters by the residuals of all series, one after the other.
 
     Parameters
     ----------
     tests: the tests, linearised.
-    C: covariance of the parameters for given hyperparameters, (p, p).
+    prior: prior of the parameters.
     hyperparameters: the noise model.
     varies: as in `estimate_posterior`.
     """
-    variance = hyperparameters.spread**2 * varies
+    T = hyperparameters.spread**2 * varies
+    A = prior.information
     columns = []
     for test in tests:
-        H = [_whiten(J, one, hyperparameters) for one, _, J in zip(*test, strict=True)]
-        M = sum((one.T @ one for one in H), np.zeros(C.shape))
-        # J' V^-1 = (I + M T)^-1 J' S^-1 R^-1 S^-1
-        factor = C @ np.linalg.inv(np.eye(varies.size) + M * variance)
-        for series, white in zip(test.series, H, strict=True):
-            unit_residuals = _whiten(np.eye(white.shape[0]), series, hyperparameters)
-            columns.append(factor @ white.T @ unit_residuals)
-    return np.concatenate(columns, axis=1)
+        shared = _with_spread(*_working_terms(test, hyperparameters), T)
+        A = A + shared.M
+        for series, J in zip(test.series, test.derivatives, strict=True):
+            sigma = series.sigma(hyperparameters.levels)
+            columns.append(shared.K.T @ (J.T / sigma**2))
+    return np.asarray(np.linalg.solve(A, np.concatenate(columns, axis=1)))
 
 
 def specimen_residuals(
@@ -286,27 +319,34 @@ def specimen_residuals(
     hyperparameters: the noise model.
     varies: as in `estimate_posterior`.
     """
-    variance = hyperparameters.spread**2 * varies
+    T = hyperparameters.spread**2 * varies
     residuals = []
     for test in tests:
-        M = np.zeros((varies.size, varies.size))
-        v = np.zeros(varies.size)
-        for series, residual, J in zip(*test, strict=True):
-            H = _whiten(J, series, hyperparameters)
-            M += H.T @ H
-            v += H.T @ _whiten(residual, series, hyperparameters)
-        deviation = -np.linalg.solve(np.eye(varies.size) + variance[:, None] * M, variance * v)
+        M, v = _working_terms(test, hyperparameters)
+        deviation = -_with_spread(M, v, T).K @ (T * v)
         for residual, J in zip(test.residuals, test.derivatives, strict=True):
             residuals.append(residual + J @ deviation)
     return np.concatenate(residuals)
 
 
-def _whiten(rows: Array, series: Series, hyperparameters: Hyperparameters) -> Array:
-    """Residuals, or their derivatives, transformed to independent ones of unit variance."""
-    scaled = (rows.T / series.sigma(hyperparameters.levels)).T
-    if series.is_known:
-        return scaled
-    return _decorrelate(scaled, hyperparameters.autocorrelation[series.test])
+def _working_terms(test: LinearTest, hyperparameters: Hyperparameters) -> tuple[Array, Array]:
+    """J' S^-2 J (p, p) and J' S^-2 r (p,) of a test, the terms of its estimate."""
+    p = test.derivatives[0].shape[1]
+    M = np.zeros((p, p))
+    v = np.zeros(p)
+    for series, residual, J in zip(*test, strict=True):
+        sigma = series.sigma(hyperparameters.levels)
+        H = J / sigma[:, None]
+        M += H.T @ H
+        v += H.T @ (residual / sigma)
+    return M, v
+
+
+def _correlate(rows: Array, rho: float) -> Array:
+    """R times rows (n, ...), R being the correlation matrix rho^|i - j|."""
+    index = np.arange(rows.shape[0])
+    R = rho ** np.abs(np.subtract.outer(index, index)) if rho else np.eye(index.size)
+    return np.asarray(R @ rows)
 
 
 def _decorrelate(rows: Array, rho: float) -> Array:
@@ -317,32 +357,57 @@ def _decorrelate(rows: Array, rho: float) -> Array:
     return independent
 
 
-def _sum_series(test: LinearTest, grid: "_Grid") -> tuple[Array, Array, Array, Array]:
-    """Terms of a test on the grid, V being its covariance without spread.
+class _TestTerms(NamedTuple):
+    """Terms of a test on the grid, without the spread between specimens.
 
-    Returns J' V^-1 J (..., p, p), J' V^-1 r (..., p), r' V^-1 r and ln|V| (...).
+    M, v, q, log_determinant: J' V^-1 J (..., p, p), J' V^-1 r (..., p), r' V^-1 r and ln|V|.
+    working_M, working_v: the same with the independent weights W.
+    G: J' W^-1 V W^-1 J, (..., p, p).
     """
-    M: Any = 0.0
-    v: Any = 0.0
-    q: Any = 0.0
-    log_determinant: Any = 0.0
+
+    M: Any
+    v: Any
+    q: Any
+    log_determinant: Any
+    working_M: Any
+    working_v: Any
+    G: Any
+
+
+def _sum_series(test: LinearTest, grid: "_Grid") -> _TestTerms:
+    """The terms of a test, summed over its series."""
+    total: list[Any] = [0.0] * len(_TestTerms._fields)
     for series, residual, J in zip(*test, strict=True):
         axes = grid.axes_of(series)
-        terms = []
+        points = []
         for point in product(*(grid.values[axis] for axis in axes)):
             hyperparameters = grid.hyperparameters(axes, point)
-            z = _whiten(residual, series, hyperparameters)
-            H = _whiten(J, series, hyperparameters)
-            rho = hyperparameters.autocorrelation.get(series.test, 0.0)
-            log_sigma = np.log(series.sigma(hyperparameters.levels))
-            log_det = 2 * np.sum(log_sigma) + (z.size - 1) * np.log(1 - rho**2)
-            terms.append((H.T @ H, H.T @ z, z @ z, log_det))
-        placed = [grid.place(axes, np.array(column)) for column in zip(*terms, strict=True)]
-        M = M + placed[0]
-        v = v + placed[1]
-        q = q + placed[2]
-        log_determinant = log_determinant + placed[3]
-    return M, v, q, log_determinant
+            points.append(_series_terms(series, residual, J, hyperparameters))
+        placed = [grid.place(axes, np.array(column)) for column in zip(*points, strict=True)]
+        total = [sum_ + term for sum_, term in zip(total, placed, strict=True)]
+    return _TestTerms(*total)
+
+
+def _series_terms(
+    series: Series, residual: Array, J: Array, hyperparameters: Hyperparameters
+) -> _TestTerms:
+    """The terms of one series for given hyperparameters."""
+    sigma = series.sigma(hyperparameters.levels)
+    rho = hyperparameters.autocorrelation.get(series.test, 0.0)
+    z = residual / sigma
+    H = J / sigma[:, None]
+    white_z = _decorrelate(z, rho)
+    white_H = _decorrelate(H, rho)
+    log_determinant = 2 * np.sum(np.log(sigma)) + (z.size - 1) * np.log(1 - rho**2)
+    return _TestTerms(
+        M=white_H.T @ white_H,
+        v=white_H.T @ white_z,
+        q=white_z @ white_z,
+        log_determinant=log_determinant,
+        working_M=H.T @ H,
+        working_v=H.T @ z,
+        G=H.T @ _correlate(H, rho),
+    )
 
 
 class _Grid:
@@ -357,16 +422,18 @@ class _Grid:
     def __init__(self, previous: NoiseEstimate) -> None:
         self._sources = [*previous.mean.levels]
         self._tests = [*previous.autocorrelations]
+        is_fine = len(self._sources) <= MAX_FINE_LEVELS
+        deviates = _LEVEL_GRID if is_fine else _COARSE_LEVEL_GRID
         log_levels = [
-            _level_axis(previous.mean.levels[source], previous.log_errors[source])
+            _level_axis(source, previous.mean.levels[source], previous.log_errors[source], deviates)
             for source in self._sources
         ]
         self.values = [*log_levels, *previous.autocorrelations.values(), previous.spreads]
         self.shape = tuple(axis.size for axis in self.values)
         self.spread = self.place((len(self.values) - 1,), previous.spreads)
         log_prior: Any = np.zeros(())
-        for axis, log_level in enumerate(log_levels):
-            log_prior = log_prior - 0.5 * self.place((axis,), log_level / _LEVEL_SD) ** 2
+        for axis, (source, log_level) in enumerate(zip(self._sources, log_levels, strict=True)):
+            log_prior = log_prior - 0.5 * self.place((axis,), log_level / _level_sd(source)) ** 2
         for k, rho in enumerate(previous.autocorrelations.values()):
             dependent = (1 - INDEPENDENCE) / (AUTOCORRELATIONS.size - 1)
             probability = np.where(rho == 0.0, INDEPENDENCE, dependent)
@@ -444,11 +511,16 @@ class _Grid:
         return self.hyperparameters(range(len(point)), point)
 
 
-def _level_axis(level: float, log_error: float) -> Array:
-    """Logarithms of a level about an estimate, within the largest and smallest level."""
+def _level_sd(source: str) -> float:
+    """Standard deviation of the prior of the logarithm of a level."""
+    return float(np.log(LEVEL_FACTORS.get(source, LEVEL_FACTOR)) / 1.96)
+
+
+def _level_axis(source: str, level: float, log_error: float, deviates: Array) -> Array:
+    """Logarithms of a level about an estimate, within 3.3 deviations of the expected level."""
     sd = max(log_error, _MIN_LEVEL_SD)
-    bound = np.log(MAX_LEVEL_FACTOR) - _LEVEL_GRID[-1] * sd
-    return np.asarray(np.clip(np.log(level), -bound, bound) + sd * _LEVEL_GRID)
+    bound = max(_MAX_LEVEL * _level_sd(source) - deviates[-1] * sd, 0.0)
+    return np.asarray(np.clip(np.log(level), -bound, bound) + sd * deviates)
 
 
 def _probable(values: Array, probabilities: Array, all_values: Array) -> Array:

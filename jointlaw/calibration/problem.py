@@ -28,7 +28,6 @@ nothing else determines then has a wide but finite interval, and C exists.
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -76,6 +75,7 @@ CLOSURE_PARAMETERS = (
 INITIAL_MATING_LENGTHS = (0.5, 0.15, 0.05, 0.015)
 START_TOLERANCE = 1e-5  # relative change of parameters and misfit, with the expected noise
 COARSE_TOLERANCE = 1e-3  # likewise, for initial values
+REJECTED_RESIDUAL = 1e6  # of a law that cannot follow a test
 BOUND_MARGIN = 1e-9  # of the distance of the bounds: a fit stays away from them by this much
 DIFFERENCE_STEP = 1e-4  # of central differences, of a transformed parameter
 Function = Callable[[Array], Array]
@@ -247,7 +247,7 @@ def build_problem(
     values |= {name: number(f"fixed[{name!r}]", value) for name, value in fixed.items()}
     build_law(values, settings)  # raises ValueError for values that no law has
     values |= {
-        name: _finite_initial_value(name, closures, shears)
+        name: _finite_initial_value(name, closures, shears, build_law(values, settings))
         for name in free_names
         if math.isinf(values[name])
     }
@@ -278,11 +278,18 @@ def _default_free(closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]
 
 
 def _finite_initial_value(
-    name: str, closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]
+    name: str, closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve], law: JointLaw
 ) -> float:
-    """Initial value of a parameter with an infinite default: half the range of the tests."""
+    """Initial value of a parameter with an infinite default: half the range of the tests.
+
+    For a yield interference without a closure test this is half the closure of the law at the
+    largest normal stress: beyond the closure no asperity would yield, and the misfit would not
+    depend on it.
+    """
     if not shears or (closures and name == "yield_interference"):
         return 0.5 * max(float(np.ptp(curve.closure)) for curve in closures)
+    if name == "yield_interference":
+        return 0.5 * float(law.closure(max(float(np.max(curve.normal)) for curve in shears)))
     if name == "slope_wear":
         return 0.5 * max(
             float(np.max(np.abs(curve.shear_stress)) * np.sum(np.abs(np.diff(curve.shear))))
@@ -408,16 +415,23 @@ def solve(problem: Problem, starts: Sequence[Array], previous: Solution | None =
         is_small = np.abs(step) < STEP_TOLERANCE * np.sqrt(np.diag(posterior.covariance))
         if is_small.all() and level_change < LEVEL_TOLERANCE:
             break
-    C = posterior.conditional_covariance
+    C = posterior.covariance
+    P = posterior.prior_weight
     return Solution(
         x=x,
-        information=posterior.information - prior_precision,
-        covariance=posterior.covariance,
+        information=_positive(np.linalg.inv(C) - prior_precision, (high - low) ** -2),
+        covariance=C,
         noise=noise,
-        prior_share=np.diag(C @ prior_precision @ C) / np.diag(posterior.covariance),
-        gain=parameter_gain(tests, C, posterior.mode, problem.varies),
+        prior_share=np.diag(P @ prior_precision @ P) / np.diag(C),
+        gain=parameter_gain(tests, prior, posterior.mode, problem.varies),
         specimen_residuals=specimen_residuals(tests, posterior.mode, problem.varies),
     )
+
+
+def _positive(information: Array, least: Array) -> Array:
+    """An information matrix (p, p) whose eigenvalues are at least those of the bounds, `least`."""
+    values, vectors = np.linalg.eigh(information)
+    return np.asarray((vectors * np.maximum(values, least.min())) @ vectors.T)
 
 
 def _linearise(problem: Problem, x: Array) -> tuple[list[LinearTest], Prior, Array]:
@@ -491,20 +505,33 @@ def minimise(problem: Problem, starts: Sequence[Array], tolerance: float) -> Arr
     problem: the problem.
     starts: initial vectors.
     tolerance: relative change of the vector and of the sum at the end.
+
+    Raises ValueError if the law of a start cannot follow a test. Other laws that cannot are steps
+    that the search rejects.
     """
+    sigma = problem.expected_sigma
     low, high = problem.bounds()
     margin = BOUND_MARGIN * (high - low)
+    inside = [np.clip(x, low + margin, high - margin) for x in starts]
+    n_residuals = problem.residuals(inside[0], sigma).size
+
+    def residuals(x: Array) -> Array:
+        try:
+            return problem.residuals(x, sigma)
+        except ValueError:
+            return np.full(n_residuals, REJECTED_RESIDUAL)
+
     fits = [
         least_squares(
-            partial(problem.residuals, sigma=problem.expected_sigma),
-            np.clip(x, low + margin, high - margin),
+            residuals,
+            x,
             bounds=(low, high),
             method="dogbox",
             x_scale="jac",
             xtol=tolerance,
             ftol=tolerance,
         )
-        for x in starts
+        for x in inside
     ]
     return np.asarray(min(fits, key=lambda fit: float(fit.cost)).x)
 

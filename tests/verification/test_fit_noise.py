@@ -51,7 +51,9 @@ def covariance_matrix(test, level, rho, spread):
 
 
 def test_posterior_equals_direct_integration():
-    """The likelihood of each grid point by the normal density of all residuals."""
+    """The likelihood of each grid point by the normal density of all residuals; the sandwich
+    estimator by matrices.
+    """
     rng = np.random.default_rng(0)
     tests = linear_tests(rng, np.array([0.1, -0.05]), (4, 6), rho=0.6, spread=0.05)
     prior = Prior(np.diag([4.0, 9.0]), np.zeros(2))
@@ -74,9 +76,13 @@ def test_posterior_equals_direct_integration():
         ).logpdf(r)
         probability = INDEPENDENCE if rho == 0 else (1 - INDEPENDENCE) / 5
         log_weights.append(evidence - (log_level / LEVEL_SD) ** 2 / 2 + np.log(probability))
-        C = np.linalg.inv(J.T @ np.linalg.solve(V, J) + prior.information)
-        covariances.append(C)
-        steps.append(-C @ J.T @ np.linalg.solve(V, r))
+        W = np.zeros((r.size, r.size))
+        W[:4, :4] = covariance_matrix(tests[0], np.exp(log_level), 0.0, spread)
+        W[4:, 4:] = covariance_matrix(tests[1], np.exp(log_level), 0.0, spread)
+        weights = np.linalg.solve(W, J)
+        inverse = np.linalg.inv(J.T @ weights + prior.information)
+        covariances.append(inverse @ (weights.T @ V @ weights + prior.information) @ inverse)
+        steps.append(-inverse @ weights.T @ r)
         spreads.append(spread)
     weight = np.exp(log_weights - np.max(log_weights))
     weight /= weight.sum()
@@ -91,23 +97,28 @@ def test_posterior_equals_direct_integration():
 
 
 def test_misfit_gain_and_specimens_of_one_noise_model():
-    """By matrices: r' V^-1 r, C J' V^-1, and the residuals of the best specimens."""
+    """By matrices: r' W^-1 r, the gain, and the residuals of the best specimens."""
     tests = linear_tests(np.random.default_rng(1), np.array([0.1, 0.2]), (5, 7), rho=0.5)
     varies = np.array([True, False])
     estimate = prior_estimate([tests[0].series[0]], has_specimens=True)
     model = replace_mean(estimate, 1.5, 0.6, 0.1)
-    C = np.array([[2.0, 0.3], [0.3, 1.0]])
-    total, gains, residuals = 0.0, [], []
+    prior = Prior(np.array([[2.0, 0.3], [0.3, 1.0]]), np.zeros(2))
+    total = 0.0
+    information = prior.information
+    weights = []
+    residuals = []
     for test in tests:
-        J, r = test.derivatives[0], test.residuals[0]
-        noise = covariance_matrix(test, 1.5, 0.6, 0.0)
-        V = noise + 0.1**2 * np.outer(J[:, 0], J[:, 0])
-        total += r @ np.linalg.solve(V, r)
-        gains.append(C @ np.linalg.solve(V, J).T)
-        residuals.append(noise @ np.linalg.solve(V, r))  # the normal mean of the noise
+        J = test.derivatives[0]
+        r = test.residuals[0]
+        noise = covariance_matrix(test, 1.5, 0.0, 0.0)
+        W = noise + 0.1**2 * np.outer(J[:, 0], J[:, 0])
+        total += r @ np.linalg.solve(W, r)
+        weights.append(np.linalg.solve(W, J))
+        information = information + J.T @ weights[-1]
+        residuals.append(noise @ np.linalg.solve(W, r))  # the normal mean of the noise
+    gain = np.linalg.solve(information, np.concatenate(weights).T)
     assert misfit(tests, model, varies) == pytest.approx(total, rel=1e-9)
-    gain = parameter_gain(tests, C, model, varies)
-    np.testing.assert_allclose(gain, np.concatenate(gains, axis=1), rtol=1e-8)
+    np.testing.assert_allclose(parameter_gain(tests, prior, model, varies), gain, rtol=1e-8)
     without_specimens = specimen_residuals(tests, model, varies)
     np.testing.assert_allclose(without_specimens, np.concatenate(residuals), rtol=1e-8)
 

@@ -78,6 +78,31 @@ def test_opening_separates_friction_from_slopes(law):
     assert fixed_friction.identifiable == ("a",)
 
 
+@pytest.mark.slow
+def test_yield_interference_from_shear_alone(law):
+    """It begins at a share of the closure: at that of the shear displacement nothing yields."""
+    asperity = replace(law.asperity, yield_interference=1.5e-5)
+    truth = replace(law, asperity=asperity)
+    curves = []
+    for normal in (1e6, 6e6):
+        stress, opening = simulate(truth, SHEAR, normal)
+        curves.append(ShearCurve(SHEAR, stress, normal, opening=opening))
+    fit = jl.fit_curves(curves, law=law, free=("mu", "yield_interference"), one_specimen=True)
+    assert fit.parameters["yield_interference"] == pytest.approx(1.5e-5, rel=0.1)
+    assert "yield_interference" in fit.identifiable
+
+
+def test_band_of_an_opening_is_finite(law):
+    """Three points without an opening: the band is linear, of the size of the displacement."""
+    curve = ShearCurve([0.0, 1e-3, 1e-2], [0.0, 1.3e6, 0.9e6], 1e6)
+    start = replace(law, mating_length=5e-3)
+    fit = jl.fit_curves([curve], law=start, free=("mu", "a", "mating_length"))
+    low, high = fit.shear_band(curve)[1]
+    (test,) = fit.predict_shear(curve)
+    np.testing.assert_allclose((low + high) / 2, test.opening, atol=1e-9)
+    assert np.max(np.abs([low, high])) < 1e-2
+
+
 def test_no_dilation_angle_is_reported_for_a_joint_that_only_closes(law):
     flat = replace(law, mating_length=6e-6, plane=0.0)
     shear = np.linspace(0.0, 1e-5, 8)

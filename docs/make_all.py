@@ -66,6 +66,7 @@ PARTS = {
     # validation.md
     "friction-angles": Part("docs/measure/random_laws.py angles", quoted_in="validation.md"),
     "empirical-laws": Part("docs/measure/fits.py empirical-laws", page="validation.md"),
+    "closure-predictions": Part("docs/measure/fits.py closure-predictions", page="validation.md"),
     "extrapolation": Part("docs/measure/fits.py extrapolation", page="validation.md"),
     "intervals": Part("docs/measure/fits.py intervals", page="validation.md"),
     "coverage": Part("docs/measure/coverage.py", quoted_in="../CHANGELOG.md"),

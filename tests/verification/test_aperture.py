@@ -264,8 +264,8 @@ def test_an_incomplete_flow_test_is_refused_by_name(options, message, capsys):
 
 # Errors in % at the largest stress, then rms on unloading: of the map, Bandis and a power law
 MEASURED = {
-    "vd1": {"map of the law's closure": (-6, 12), "Bandis": (-10, 19), "power law": (17, 22)},
-    "vd2": {"map of the law's closure": (6.5, 17), "Bandis": (-10, 56), "power law": (31, 59)},
+    "vd1": {"map of the law's closure": (-0.4, 7.6), "Bandis": (-10, 19), "power law": (17, 22)},
+    "vd2": {"map of the law's closure": (5.4, 17.8), "Bandis": (-10, 56), "power law": (31, 59)},
 }
 
 
@@ -274,7 +274,7 @@ MEASURED = {
 def test_measured_flow_on_unloading_follows_closure(specimen, tmp_path):
     """The table of docs/water.md: map and forms are fitted to loading up to 5.3 MPa."""
     command = (
-        f"fit {DATA}/grimsel_{specimen}_closure.csv --cycle --compliance 42.8um/10.27MPa "
+        f"fit {DATA}/grimsel_{specimen}_closure.csv --cycle --compliance 2um/1MPa "
         f"--flow {DATA}/grimsel_flow_{specimen}.csv --flow-up-to 5.3MPa {FLOW} --out {tmp_path}"
     )
     assert main(shlex.split(command)) == 0
@@ -285,12 +285,10 @@ def test_measured_flow_on_unloading_follows_closure(specimen, tmp_path):
 
 
 @measured_flow
-@pytest.mark.parametrize(
-    ("specimen", "at_largest", "unloading"), [("vd1", 10, 19), ("vd2", 16, 52)]
-)
+@pytest.mark.parametrize(("specimen", "at_largest", "unloading"), [("vd1", 6, 19), ("vd2", 7, 53)])
 def test_a_law_fitted_to_loading_alone_does_not_predict_unloading(specimen, at_largest, unloading):
     """As far off as Bandis' form: without plastic indentation the joint opens again."""
-    compliance = 42.8e-6 / 10.27e6
+    compliance = 2e-12
     stress, closure, _ = read_closure(DATA / f"grimsel_{specimen}_closure.csv")
     curve = jl.ClosureCurve(*first_loading(stress, closure), compliance=compliance)
     test = read_flow(DATA / f"grimsel_flow_{specimen}.csv", CONDITIONS)

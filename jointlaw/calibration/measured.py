@@ -158,7 +158,7 @@ class ClosureCurve:
         return Series("closure", "stress", errors)
 
     def up_to(self, n: int) -> Self:
-        """The first n points of this test, with the same origin of the closure."""
+        """The first n points of this test, with the same origin of the closure. Raises nothing."""
         shorter = copy(self)
         object.__setattr__(shorter, "stress", self.stress[:n])
         object.__setattr__(shorter, "closure", self.closure[:n])

@@ -196,7 +196,12 @@ def left_out(name, sim):
     is_like = start.shape == value.shape and value.dtype.kind in "bif"
     if is_like and not np.allclose(start, value, rtol=ROUNDING, atol=0.0, equal_nan=True):
         return saved | {key: start}, True
-    other = zeros if np.any(value != zeros) else zeros + np.ones((), value.dtype)
+    if value.dtype.kind == "U":
+        other = np.array("another text")
+    elif np.any(value != zeros):
+        other = zeros
+    else:
+        other = zeros + np.ones((), value.dtype)
     return saved | {key: other}, False
 
 
@@ -246,7 +251,13 @@ def test_a_restored_simulation_is_the_saved_one(scene, simulations, tmp_path):
         before.save(tmp_path)
         for again in (before, Simulation.load(tmp_path)):
             assert not differing(again.state(), saved)
-            found, expected = numbers(again), numbers(sim)
+            found = numbers(again)
+            expected = numbers(sim)
+            # A restored traction is the one of a zero increment, the other one of the last step:
+            # they may differ by rounding. The next step replaces both.
+            np.testing.assert_allclose(
+                found.pop("joints.traction"), expected.pop("joints.traction"), rtol=1e-12, atol=1e-6
+            )
             expected["manager.needs_rebuild"] = saved["manager.needs_rebuild"]
             assert not differing(found, expected) - NO_STATE - OVERWRITTEN
 

@@ -157,18 +157,13 @@ def contact_kinematics(blocks: Blocks, contacts: Contacts) -> np.ndarray:
 def opening_and_sliding_rates(blocks: Blocks, contacts: Contacts) -> csr_array:
     """Matrix (2 k, free motions) from motions of the blocks to the rates of the contacts.
 
-    Opening rates (k,) along the normal, then sliding rates (k,), for motions scaled by the
-    square root of their inertia.
+    Opening rates (k,) along the normal, then sliding rates (k,): `contact_kinematics` without the
+    prescribed motions.
     """
     k = len(contacts.closure)
     block = np.concatenate([contacts.block_a, contacts.block_b])
-    arm = np.tile(contacts.position, 2) - (blocks.motion[0] + 1j * blocks.motion[1])[block]
-    directions = np.tile([contacts.normal, -1j * contacts.normal], 2)
-    signed = np.repeat([-1.0, 1.0], k) * directions
-    rotation = (arm.conj() * signed).imag
-    entries = (
-        np.stack([signed.real, signed.imag, rotation], axis=2) * blocks.inverse_sqrt_inertia[block]
-    )
+    of_a, of_b = np.split(contact_kinematics(blocks, contacts).transpose(1, 0, 2), 2, axis=2)
+    entries = np.concatenate([of_a, of_b], axis=1)  # (2, 2 k, 3)
     row = np.tile(np.arange(2 * k).reshape(2, k), 2)[:, :, None]
     column = 3 * block[:, None] + np.arange(3)
     places = tuple(place.ravel() for place in np.broadcast_arrays(row, column))

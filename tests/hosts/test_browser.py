@@ -25,7 +25,7 @@ READY = "typeof test === 'object' && test.rows.length >= 40"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def page_file(tmp_path_factory):
     return export.export_browser(tmp_path_factory.mktemp("page"))
 
 
@@ -36,10 +36,10 @@ def browser(tmp_path_factory):
 
 
 @pytest.fixture
-def chromium(browser, made):
+def chromium(browser, page_file):
     """The page with rough granite closed under 10 MPa; the test must end without an error."""
     browser.call("Page.navigate", url="about:blank")
-    browser.call("Page.navigate", url=made.as_uri())
+    browser.call("Page.navigate", url=page_file.as_uri())
     browser.wait(READY)
     browser.run("story.at = -1")
     choose(browser, "westerly-rough")
@@ -185,7 +185,7 @@ def test_every_test_plays_to_its_end_at_what_is_held(chromium, hold):
 
 
 def test_the_six_steps_can_be_done(chromium):
-    chromium.run("begin(); story.go(0, (before) => remake(legsOf(before))); redraw()")
+    chromium.run("begin(); story.go(0, (before) => rebuild(legsFor(before))); redraw()")
     move(chromium, "level", 200)
     for slips in ([], [(60, 0)], [(15, 0)], [(30, 0)], [(-25, 0)], [(12, 0)]):
         if chromium.run("story.at") == 5:
@@ -197,11 +197,13 @@ def test_the_six_steps_can_be_done(chromium):
     assert chromium.run("part('task').textContent").startswith("Done")
 
 
-def test_what_cannot_be_loaded_is_told(browser, made, tmp_path):
-    (tmp_path / "index.html").write_text(made.read_text().replace('"wasm": "', '"wasm": "AAAA'))
+def test_what_cannot_be_loaded_is_told(browser, page_file, tmp_path):
+    (tmp_path / "index.html").write_text(
+        page_file.read_text().replace('"wasm": "', '"wasm": "AAAA')
+    )
     browser.call("Page.navigate", url=(tmp_path / "index.html").as_uri())
-    browser.wait("document.getElementById('joint-says')?.textContent")
-    assert "cannot be shown" in browser.run("document.getElementById('joint-says').textContent")
+    browser.wait("document.getElementById('joint-message')?.textContent")
+    assert "cannot be shown" in browser.run("document.getElementById('joint-message').textContent")
     assert browser.errors
     browser.errors.clear()
 
@@ -254,7 +256,7 @@ SCENES = {
     "the picture has an end, which is told": [
         ("drag", [(0, 0), (170, 0)]),
         ("is", "Math.abs(test.slip / test.joint.length - 7) < 0.02"),
-        ("is", "!drawn && part('says').textContent.includes('picture ends')"),
+        ("is", "!drawn && part('message').textContent.includes('picture ends')"),
         ("drag", LEFT),
         ("is", "test.slip < 6 * test.joint.length"),
     ],
@@ -262,7 +264,7 @@ SCENES = {
         ("move", "hold", "closure"),
         ("drag", DOWN),
         ("is", "Math.max(...test.rows.map((row) => row.normal)) <= 20.02e6"),
-        ("is", "!drawn && part('says').textContent.includes('20 MPa')"),
+        ("is", "!drawn && part('message').textContent.includes('20 MPa')"),
     ],
     "what does nothing leaves scrolling alone": [
         ("is", "part('scene').style.touchAction === 'pan-y'"),
@@ -324,7 +326,7 @@ SCENES = {
         # facets that were climbed stay loaded
         ("is", "test.joint.F[1] < 0.5 * before[1] && test.joint.F[2] > 0.8 * before[1]"),
     ],
-    "what is energies has an end": [
+    "the stored path has an end": [
         ("run", "for (let i = 0; i < 400; i++) drag((i % 2 ? -0.3 : 0.3) * test.joint.length, 0)"),
         ("is", "test.rows.length > 4000 && test.rows.length <= 6000"),
         ("run", "for (let i = 0; i < 400; i++) drag((i % 2 ? -1 : 1) * test.joint.length / 99, 0)"),
@@ -340,7 +342,7 @@ SCENES = {
                ".every((x, i) => Math.abs(x / before[i] - 1) < 1e-5)"),
     ],
     "rounding is not shown, and energies add up": [
-        ("is", "!drawn && part('told').textContent.includes('shear stress 0 MPa')"),
+        ("is", "!drawn && part('values').textContent.includes('shear stress 0 MPa')"),
         ("drag", RIGHT),
         ("is", "!drawn && Math.abs(100 - ['stored', 'lost'].reduce((sum, name) =>"
                " sum + parseFloat(part(`${name}-bar`).style.width), 0)) < 1e-3"),
@@ -350,7 +352,7 @@ SCENES = {
         ("is", "part('status').textContent.includes('slip 0')"),
         ("run", f"window.heard = 0; {SEEN}"),
         ("drag", [(x, 0) for x in range(25)]),
-        ("is", "heard && part('status').textContent.includes(part('told').textContent)"),
+        ("is", "heard && part('status').textContent.includes(part('values').textContent)"),
         ("is", "heard <= 2"),
     ],
 }  # fmt: skip

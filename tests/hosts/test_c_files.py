@@ -15,7 +15,7 @@ from programs import find_program, run_program
 
 import jointlaw as jl
 from jointlaw.cli.main import main
-from jointlaw.hosts.c.export import _sum, header_text, table_text
+from jointlaw.hosts.c.export import _checksum, header_text, table_text
 from jointlaw.native.build import BUILT
 from jointlaw.native.layout import TABLE_FORMAT, jointlaw_h
 
@@ -134,7 +134,7 @@ def test_two_threads_on_one_law(tmp_path, law):
 def resigned(text):
     """The text with a sum that fits."""
     body = text[: text.rindex("\nsum ") + 1]
-    return f"{body}sum {_sum(body.encode()):016x}\n"
+    return f"{body}sum {_checksum(body.encode()):016x}\n"
 
 
 BAD = {
@@ -250,7 +250,7 @@ def test_examples_of_fewer_components(tmp_path, law, plane):
     lines = run_program(example, tmp_path / "flat.jlaw").splitlines()
     assert len(lines) == (2 if "only" in plane else 41)
     spheres = build(tmp_path, tmp_path / "example.cpp", *flags, "-std=c++11", cc="c++", name="s")
-    assert "contacts begun" in run_program(spheres)
+    assert "contacts formed" in run_program(spheres)
 
 
 BAD_NAMES = ("3mm", "a-b", "", "x" * 60, "double", "class", "jlaw_read")

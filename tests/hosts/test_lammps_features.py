@@ -158,7 +158,7 @@ run 2000"""
     text = run(plugin, HEAD + start + MOTION + more, 2)
     table = thermo(text)[0]
     law = LAWS["rock"]
-    assert "nothing touches yet" in text
+    assert "there is no contact yet" in text
     step = law.critical_time_step(MASS / 7, AREA, law.closure(1e6))
     assert table["c_joint[6]"][0] == pytest.approx(step, rel=1e-9)
     assert table["c_joint[1]"][0] == 0 < table["c_joint[1]"].max() <= 16  # none within the wall
@@ -177,6 +177,6 @@ def test_changes_between_runs(plugin):
         for name in ("PotEng", "c_joint[1]", "c_joint[2]"):
             assert second[name][0] == pytest.approx(first[name][-1], rel=1e-12), (change, name)
     assert after["c_joint[1]"][0] < before["c_joint[1]"][-1]
-    counts = re.findall(r"jointlaw: (\d+) joints under load were given up", text)
+    counts = re.findall(r"jointlaw: (\d+) joints under load were deleted", text)
     assert sum(map(int, counts)) == after["c_joint[5]"][-1] > 0
     assert "is above the largest stable one" in text

@@ -1,4 +1,4 @@
-"""A joint in a browser: the law as WebAssembly, tables of the presets and a page around them."""
+"""A joint in a browser: a page with the law as WebAssembly and tables of the presets."""
 
 import base64
 import json
@@ -19,7 +19,7 @@ from ...support.files import write_files
 from ..c.export import packed
 
 HERE = Path(__file__).parent
-WASM = "joint.wasm"  # by builder/wasm.py; in the repository: a reader of the page needs no compiler
+WASM = "joint.wasm"  # built by builder/wasm.py, so that exports need no compiler
 SCRIPTS = ("law.js", "test.js", "pictures.js", "story.js", "page.js")
 _PAGE = """<!doctype html>
 <html lang="en">
@@ -40,17 +40,17 @@ _PAGE = """<!doctype html>
 
 
 def export_browser(directory: str | Path) -> Path:
-    """Write `index.html`, a joint to drag in a browser, with all that it needs; returns its path.
+    """Write `index.html`, an interactive joint in one file; returns its path.
 
-    directory: made if missing; a file of that name is replaced. Raises ValueError where it cannot
-    be made.
+    directory: created if missing; a file of that name is replaced. Raises ValueError if it cannot
+    be created.
     """
     part = (HERE / "joint.html").read_text(encoding="utf-8")
     return write_files(directory, {"index.html": _PAGE.format(part, script())}) / "index.html"
 
 
 def script() -> str:
-    """The script of that page: tables of the presets, the law, and what draws it."""
+    """The script of the page: tables of the presets, the law, tests and pictures."""
     about = {
         "numbers": {name: getattr(LawStruct, name).offset for name in (*INTEGERS, *REALS)},
         "begin": LawStruct.facet.offset,
@@ -75,15 +75,15 @@ def script() -> str:
 
 
 def tables(law: Law) -> bytes:
-    """A law's tables, as `take_law` of joint.c reads them: the numbers, then the arrays.
+    """Tables of a law as `load_law` of joint.c reads them: the numbers, then the arrays.
 
-    Raises ValueError for a law that joint.c does not run.
+    Raises ValueError for a law that joint.c does not support.
     """
     numbers, arrays = packed(law)
     if numbers["dim"] != 3 or any(
         numbers[name] for name in ("yields", "degrades", "curve_exponent", *ELEMENTS)
     ):
-        raise ValueError("joint.c runs elastic laws in space, of asperities alone")
+        raise ValueError("joint.c supports elastic laws in space that consist of asperities only")
     head = bytes(LawStruct(**numbers))[: LawStruct.facet.offset]
     return b"".join([head, *(array.tobytes() for array in arrays.values())])
 

@@ -1,19 +1,19 @@
-/* The law in a page: the tables of a rock, with other numbers if asked, and the compiled law with the
- * state of one joint (joint.c). All in m, Pa and J/m2. */
+/* The law in the page: the tables of a rock, also with other parameters, and the compiled law with the
+ * state of one joint (joint.c). Units: m, Pa, J/m2. */
 
-const FULL_STRESS = 20e6; // the largest normal stress, to which the tables of the rocks reach
-const SEAT = 10e6; // of a joint that begins
+const FULL_STRESS = 20e6; // the largest normal stress of the tables
+const INITIAL_STRESS = 10e6; // of a new joint
 const DIM = 3;
 const OPEN_ENDED = 1e300; // nodes.UNUSED: cells that begin there stay empty
 
 const decoded = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 
-/* The numbers of a preset that the page may change */
-const numbersOf = ({ a, c, mu }) => ({ a, c, mu, mating: Infinity });
+/* The parameters of a preset that the page can change */
+const parametersOf = ({ a, c, mu }) => ({ a, c, mu, mating: Infinity });
 
 /* ------------------------------------------------------------------------------------ tables */
 
-/* Bytes of a law's tables that can be read and changed by name */
+/* Tables of a law as bytes, with access by name */
 class Tables {
   constructor(bytes) {
     this.bytes = bytes.slice();
@@ -28,7 +28,7 @@ class Tables {
   number(name) { return this.view.getFloat64(JOINTLAW.numbers[name], true); }
   setNumber(name, value) { this.view.setFloat64(JOINTLAW.numbers[name], value, true); }
 
-  /* Where a column of a facet, or a row of one of its cells, stands */
+  /* Byte offset of a column of a facet, or of a row of one of its cells */
   place(facet, name, more = 0) {
     const { columns, lanes } = JOINTLAW, block = Math.floor(facet / lanes);
     return JOINTLAW.begin + 8 * ((block * columns.COLUMNS + columns[name] + more) * lanes + (facet % lanes));
@@ -41,7 +41,7 @@ class Tables {
   get(place) { return this.view.getFloat64(place, true); }
   set(place, ...values) { values.forEach((value, i) => this.view.setFloat64(place + 8 * i * JOINTLAW.lanes, value, true)); }
 
-  /* Phi, Phi' and Phi'' of the virgin curve at y > 0: cubic pieces of S over t */
+  /* Phi, Phi' and Phi'' of the first-loading curve at y > 0: cubic pieces of S over t */
   curve(y) {
     const eta = this.number("eta"), v = Math.sqrt(y), V = this.number("curve_scale");
     const t = v / (v + V), s = V / (v + V), n = this.pieces;
@@ -56,16 +56,16 @@ class Tables {
   }
 }
 
-/* The tables of a rock with other a, c, mu or mating length, by the rules of the page "Theory", part
- * "Where the facets and cells stand": closure range and numbers of nodes stay */
+/* Tables of a rock with other a, c, mu or mating length, by the discretisation of the page "Theory";
+ * closure range and numbers of nodes do not change */
 function tablesOf(rock, { a, c, mu, mating }) {
-  const tables = new Tables(rock.bytes), own = numbersOf(rock);
-  if (a === own.a && c === own.c && mu === own.mu && mating === own.mating) return tables.bytes;
+  const tables = new Tables(rock.bytes), preset = parametersOf(rock);
+  if (a === preset.a && c === preset.c && mu === preset.mu && mating === preset.mating) return tables.bytes;
   const M = tables.facets, old = [];
   for (let i = 0; i < M; i++) {
     const get = (name, more) => tables.get(tables.place(i, name, more));
     const theta = Math.acos(Math.min(1, get("N"))), phi = Math.atan2(get("E", 1), get("E"));
-    old.push({ u: Math.cos(own.a * theta), phi, c1: get("COS_THETA"), share: get("WEIGHT"), A: get("A") });
+    old.push({ u: Math.cos(preset.a * theta), phi, c1: get("COS_THETA"), share: get("WEIGHT"), A: get("A") });
   }
   const eta = tables.number("eta"), soft = tables.number("stiffness_ratio"), shares = ringShares(tables, old);
   const whole = old.findIndex((f) => f.share > 0);
@@ -87,7 +87,7 @@ function tablesOf(rock, { a, c, mu, mating }) {
   return tables.bytes;
 }
 
-/* Share of each facet without c: the mean of its ring, for c sums to zero over a ring */
+/* Weight of each facet without c: the mean over its inclination, because c sums to zero over it */
 function ringShares(tables, facets) {
   return facets.map((f, i) => {
     const ring = facets.filter((other) => Math.abs(other.u - f.u) < 1e-9);
@@ -113,7 +113,7 @@ function setFacet(tables, i, { theta, phi, share, c1, steep, A }, mu, soft) {
 
 const GRID = 512;
 
-/* y where the rising `xs` reach x, over `ys`: linear between */
+/* Linear interpolation of ys at x; xs increase */
 function interpolated(x, xs, ys) {
   let at = 1;
   while (at < xs.length - 1 && xs[at] < x) at++;
@@ -121,7 +121,7 @@ function interpolated(x, xs, ys) {
   return ys[at - 1] + Math.max(0, Math.min(1, share)) * (ys[at] - ys[at - 1]);
 }
 
-/* Limits of the depth cells of all facets, and what the law keeps of them */
+/* Limits of the cells of all facets, and the numbers that the law stores of them */
 function setCells(tables, range, facets) {
   const low = (i, j) => tables.get(tables.cellPlace(i, j, "ZETA_START"));
   const counts = facets.map((_, i) => Array.from({ length: tables.cells }, (_, j) => low(i, j)).filter((z) => z < OPEN_ENDED).length);
@@ -144,7 +144,7 @@ function setCells(tables, range, facets) {
     begins.forEach((z, j) => {
       const put = (name, value) => tables.set(tables.cellPlace(i, j, name), value);
       put("ZETA_START", z), put("PHI_START", at[j][0]), put("DPHI_START", at[j][1]);
-      if (j === counts[i] - 1) return; // the last has no end
+      if (j === counts[i] - 1) return; // the last cell has no end
       const next = begins[j + 1], [phi, slope] = at[j + 1];
       put("ZETA_END", next), put("G_END", phi - at[j][0] - at[j][1] * (next - z)), put("KAPPA_END", slope - at[j][1]);
     });
@@ -154,15 +154,15 @@ function setCells(tables, range, facets) {
 /* ------------------------------------------------------------------------------------- a joint */
 
 class Joint {
-  /* exports: those of joint.wasm; bytes: of a law's tables. The last joint made is the one that is
-   * there: they share the memory */
+  /* exports: functions of joint.wasm; bytes: tables of a law. Joints share the memory of the module:
+   * only the last one is valid */
   constructor(exports, bytes) {
     this.wasm = exports;
     const begin = exports.bytes();
     const room = begin + 2 * bytes.length + (1 << 16) - exports.memory.buffer.byteLength;
     if (room > 0) exports.memory.grow(Math.ceil(room / (1 << 16)));
     new Uint8Array(exports.memory.buffer, begin).set(bytes);
-    let free = exports.take_law();
+    let free = exports.load_law();
     const numbers = (n) => new Float64Array(exports.memory.buffer, (free += 8 * n) - 8 * n, n);
     const size = exports.state_size();
     this.facets = exports.facet_count();
@@ -171,10 +171,10 @@ class Joint {
     this.next = numbers(size);
     this.d = numbers(DIM);
     this.out = numbers(DIM + DIM * DIM); // F and C of the last trial
-    this.wide = 5 + 2 * this.cells; // numbers of a facet that `look` writes
-    this.seen = numbers(this.facets * this.wide);
-    this.words = new Uint8Array(exports.memory.buffer, free, 300);
-    this.length = exports.closure_at(SEAT); // of the joint: its closure at 10 MPa
+    this.facetSize = 5 + 2 * this.cells; // numbers per facet that evaluate_facets writes
+    this.facetBuffer = numbers(this.facets * this.facetSize);
+    this.messageBytes = new Uint8Array(exports.memory.buffer, free, 300);
+    this.length = exports.closure_at(INITIAL_STRESS); // m, characteristic: closure of the joint at 10 MPa
     this.reset();
   }
 
@@ -190,33 +190,33 @@ class Joint {
     this.F = F;
   }
 
-  /* The traction after a step, which `keep` would take */
+  /* Traction after a trial step, which `commit` accepts */
   trial(d) {
     this.d.set(d);
-    const { state, next, out, words } = this;
+    const { state, next, out, messageBytes } = this;
     const failed = this.wasm.update(
-      state.byteOffset, next.byteOffset, this.d.byteOffset, out.byteOffset, words.byteOffset,
+      state.byteOffset, next.byteOffset, this.d.byteOffset, out.byteOffset, messageBytes.byteOffset,
     );
-    if (failed) throw new Error(new TextDecoder().decode(words.subarray(0, words.indexOf(0))));
+    if (failed) throw new Error(new TextDecoder().decode(messageBytes.subarray(0, messageBytes.indexOf(0))));
     return out;
   }
 
-  keep() {
+  commit() {
     this.state.set(this.next);
     this.F = Array.from(this.out.subarray(0, DIM));
   }
 
-  /* The closure increment with which this shear ends at a normal stress: Newton's method, kept in
-   * a bracket. Leaves that step as the last trial. */
+  /* Closure increment at which a step with this shear ends at a normal stress: Newton's method with a
+   * bracket. That step is then the last trial. */
   closing(shear, stress) {
     let low = -Infinity, high = Infinity, u = 0, reach = 0.01 * this.length;
     for (let tries = 0; tries < 100; tries++) {
       const out = this.trial([u, ...shear]);
-      const miss = out[0] - stress;
-      if (Math.abs(miss) <= 1e-9 * Math.max(stress, 1e-3 * SEAT)) break;
-      if (miss < 0) low = u;
+      const residual = out[0] - stress;
+      if (Math.abs(residual) <= 1e-9 * Math.max(stress, 1e-3 * INITIAL_STRESS)) break;
+      if (residual < 0) low = u;
       else high = u;
-      const newton = u - miss / out[DIM], far = miss < 0 ? u + reach : u - reach;
+      const newton = u - residual / out[DIM], far = residual < 0 ? u + reach : u - reach;
       if (isFinite(high - low)) u = newton > low && newton < high ? newton : (low + high) / 2;
       else u = Math.abs(newton - u) < reach ? newton : far;
       reach *= 2;
@@ -227,11 +227,11 @@ class Joint {
   get stored() { return this.wasm.stored(this.state.byteOffset); }
   get dissipated() { return this.wasm.dissipated(this.state.byteOffset); }
 
-  /* Facets now: normal, load, share of the friction that slides, and of its cells gap and use */
-  look() {
-    this.wasm.look(this.state.byteOffset, this.seen.byteOffset);
+  /* Present state of the facets: normal, load, sliding fraction, gap and utilisation of its cells */
+  facetStates() {
+    this.wasm.evaluate_facets(this.state.byteOffset, this.facetBuffer.byteOffset);
     return Array.from({ length: this.facets }, (_, i) => {
-      const row = this.seen.subarray(i * this.wide, (i + 1) * this.wide);
+      const row = this.facetBuffer.subarray(i * this.facetSize, (i + 1) * this.facetSize);
       const cells = Array.from({ length: this.cells }, (_, j) => ({ gap: row[5 + 2 * j], use: row[6 + 2 * j] }));
       return { n: Array.from(row.subarray(0, 3)), load: row[3], slides: row[4], cells };
     });

@@ -1,4 +1,4 @@
-/* The page: controls, the hand, the address. */
+/* The page: controls, pointer, address. */
 
 let exports, test, numbers, simpler = [], playing = null, drawn = false, spin = -0.6, resting = 0;
 const story = new Story();
@@ -19,7 +19,7 @@ function draw() {
   drawn = false;
   readColours();
   story.look(test);
-  const facets = test.joint.look(), mark = story.step && !story.isDone ? story.step.mark : "";
+  const facets = test.joint.facetStates(), mark = story.step && !story.isDone ? story.step.mark : "";
   drawScene(test, facets, numbers.mating, mark);
   drawCurves(test, simpler);
   drawHemisphere(test, facets, numbers.a, spin);
@@ -29,13 +29,13 @@ function draw() {
   resting = setTimeout(rest, 400);
 }
 
-/* Once nothing moves: what a screen reader tells, and the address */
+/* After a pause: text for screen readers, and the address */
 function rest() {
   const last = test.rows.at(-1);
   if (!last || playing) return;
-  part("status").textContent = `${test.says} ${part("told").textContent}`;
+  part("status").textContent = `${test.message} ${part("values").textContent}`;
   part("scene").setAttribute("aria-valuenow", three(test.slip / test.joint.length));
-  part("scene").setAttribute("aria-valuetext", part("told").textContent);
+  part("scene").setAttribute("aria-valuetext", part("values").textContent);
   const { a, c, mu, mating } = numbers, legs = legsAsText(test.legs);
   const state = { rock: rockName(), a, c, mu, mating, hold: test.hold, turn: test.degrees, path: legs };
   history.replaceState(null, "", `#${new URLSearchParams(state)}`);
@@ -44,9 +44,9 @@ function rest() {
 function showNumbers() {
   const { joint } = test, [per, unit] = scale(joint.length), size = joint.length * per;
   const last = test.rows.at(-1) || { normal: 0, shear: 0 };
-  part("told").textContent = `normal stress ${three(last.normal / 1e6)} MPa, shear stress ${three(last.shear / 1e6)} MPa, `
+  part("values").textContent = `normal stress ${three(last.normal / 1e6)} MPa, shear stress ${three(last.shear / 1e6)} MPa, `
     + `closure ${three(test.closure * per, size)} ${unit}, slip ${three(test.slip * per, size)} ${unit}`;
-  part("says").textContent = test.says;
+  part("message").textContent = test.message;
   const stored = joint.stored, lost = joint.dissipated, most = Math.max(stored + lost, 1e-300);
   const joules = (x) => `${three(x, most)} J/m²`;
   part("stored").textContent = joules(stored);
@@ -56,13 +56,13 @@ function showNumbers() {
   const held = test.hold === "stress";
   part("level-name").textContent = held ? "Normal stress" : "Closure";
   part("level").value = held ? (400 * test.level) / FULL_STRESS : 200 * (test.closure / joint.length);
-  part("level-told").textContent = held ? `${three(test.level / 1e6)} MPa` : `${three(test.closure * per, size)} ${unit}`;
+  part("level-value").textContent = held ? `${three(test.level / 1e6)} MPa` : `${three(test.closure * per, size)} ${unit}`;
   part("direction").value = test.degrees;
-  part("direction-told").textContent = `${test.degrees}°`;
+  part("direction-value").textContent = `${test.degrees}°`;
   part("hold").value = test.hold;
-  for (const name of ["a", "c", "mu"]) (part(name).value = numbers[name]), (part(`${name}-told`).textContent = three(numbers[name]));
+  for (const name of ["a", "c", "mu"]) (part(name).value = numbers[name]), (part(`${name}-value`).textContent = three(numbers[name]));
   const { mating } = numbers;
-  part("mating-told").textContent = mating < Infinity ? `${three(mating * per)} ${unit}` : "endless";
+  part("mating-value").textContent = mating < Infinity ? `${three(mating * per)} ${unit}` : "infinite";
   part("scene").style.touchAction = held ? "pan-y" : "none";
 }
 
@@ -70,68 +70,68 @@ function showStory() {
   const { step, at, isDone } = story;
   if (!step) return;
   part("step").textContent = `${at + 1} of ${STORY.length}: ${step.name}. `;
-  part("tells").textContent = step.tells;
-  part("task").textContent = isDone ? `Done. ${at + 1 < STORY.length ? "Go on." : "That was the story: now try the numbers of the joint."}` : step.task;
+  part("explanation").textContent = step.explanation;
+  part("task").textContent = isDone ? `Done. ${at + 1 < STORY.length ? "Continue." : "The tutorial is complete: now try the parameters of the joint."}` : step.task;
   part("next").disabled = at + 1 === STORY.length;
   part("back").disabled = at === 0;
-  for (const place of document.querySelectorAll("#joint .meant")) place.classList.remove("meant");
-  for (const name of isDone ? ["next"] : step.meant) part(name).classList.add("meant");
+  for (const place of document.querySelectorAll("#joint .highlighted")) place.classList.remove("highlighted");
+  for (const name of isDone ? ["next"] : step.highlighted) part(name).classList.add("highlighted");
 }
 
-// ------------------------------------------------------------------------------------ doing things
+// ------------------------------------------------------------------------------------- actions
 
-/* Do it and draw; a step that the law refuses tells its reason and changes nothing */
+/* Run an action and redraw; an invalid step shows its message and changes no state */
 function guarded(what) {
   try {
     what();
   } catch (error) {
     playing = null;
-    test.says = error.message;
+    test.message = error.message;
   }
   redraw();
 }
 
-/* A joint of this rock with these numbers, to which all these legs were done */
-function remake(legs) {
+/* A new joint of this rock with these parameters, loaded by these legs */
+function rebuild(legs) {
   playing = null;
   const { degrees, hold } = test || { degrees: 0, hold: "stress" };
   guarded(() => {
-    const made = new Test(new Joint(exports, tablesOf(rock(), numbers)));
-    made.turn(degrees);
-    test = made;
+    const created = new Test(new Joint(exports, tablesOf(rock(), numbers)));
+    created.turn(degrees);
+    test = created;
     finish(test.repeat(legs));
-    test.asked = { legs, rows: test.rows.length }; // all of it, for the next numbers may go on farther
+    test.requested = { legs, rows: test.rows.length }; // complete: with other parameters it may go further
     if (hold === "stress") test.turn(degrees), (test.hold = hold);
     compare();
   });
 }
 
-/* What was done to this joint, or asked of it, if nothing was done since */
-const path = () => (test.asked && test.asked.rows === test.rows.length ? test.asked.legs : test.legs);
+/* The path of this joint, or the requested path if nothing happened since */
+const path = () => (test.requested && test.requested.rows === test.rows.length ? test.requested.legs : test.legs);
 
-/* The leg that seats a joint at this normal stress */
-const seat = (level) => ({ hold: "stress", level, d: [0, 0, 0], steps: 1 });
+/* The leg that loads a joint to this normal stress */
+const loadTo = (level) => ({ hold: "stress", level, d: [0, 0, 0], steps: 1 });
 
-/* What was done to reach a step of the story, as legs */
-function legsOf([stress, ...slips]) {
-  const { length } = test.joint, legs = [seat(stress * 1e6)];
+/* Legs of the loading before a step of the tutorial */
+function legsFor([stress, ...slips]) {
+  const { length } = test.joint, legs = [loadTo(stress * 1e6)];
   for (const [x, y] of slips)
     legs.push({ ...legs[0], d: [0, x * length, y * length], steps: Math.ceil(100 * Math.hypot(x, y)) });
   return legs;
 }
 
-/* The curves of Coulomb and of Barton-Bandis for this stress and direction */
+/* Update the curves of Coulomb and Barton-Bandis for this stress and direction */
 function compare() {
   simpler = test.hold === "stress" && test.level > 0 ? simplerLaws(test, numbers.mu, test.level) : [];
 }
 
-/* Move the upper block by so much */
+/* Move the upper block */
 function drag(slip, closure) {
   playing = null;
   guarded(() => finish(test.hold === "stress" ? test.slide(slip) : test.move(closure, slip)));
 }
 
-/* Go to a normal stress or a closure, of 0 to 1, at this slip */
+/* Set the normal stress or closure, from 0 to 1, at this slip */
 function setLevel(share) {
   playing = null;
   guarded(() => {
@@ -141,11 +141,11 @@ function setLevel(share) {
   });
 }
 
-/* Begin anew at this level, and play a test, or none */
+/* Start a new joint at this normal stress; play a test if one is named */
 function play(name) {
   const { level, hold } = test;
-  const start = level > 0 ? level : Math.max(test.joint.F[0], SEAT / 10);
-  remake([seat(start)]);
+  const start = level > 0 ? level : Math.max(test.joint.F[0], INITIAL_STRESS / 10);
+  rebuild([loadTo(start)]);
   test.hold = hold;
   playing = name ? PLAYED[name](test) : null;
   const mine = playing, advance = () => {
@@ -158,13 +158,13 @@ function play(name) {
   advance();
 }
 
-/* Another rock, with its own numbers, seated at 10 MPa */
+/* Select another rock with its parameters, loaded to 10 MPa */
 function begin() {
-  numbers = numbersOf(rock());
+  numbers = parametersOf(rock());
   const bound = 1 / 3 - rock().b / 6;
   [part("c").min, part("c").max] = [-bound, bound];
   part("mating").value = MATINGS.length - 1;
-  remake([seat(SEAT)]);
+  rebuild([loadTo(INITIAL_STRESS)]);
 }
 
 // ---------------------------------------------------------------------------------------- the page
@@ -174,9 +174,9 @@ function listen() {
   part("preset").value = "westerly-smooth";
   part("preset").onchange = begin;
   for (const name of ["a", "c", "mu"])
-    part(name).oninput = () => ((numbers[name] = Number(part(name).value)), remake(path()));
+    part(name).oninput = () => ((numbers[name] = Number(part(name).value)), rebuild(path()));
   part("mating").max = MATINGS.length - 1;
-  part("mating").oninput = () => ((numbers.mating = MATINGS[part("mating").value] * test.joint.length), remake(path()));
+  part("mating").oninput = () => ((numbers.mating = MATINGS[part("mating").value] * test.joint.length), rebuild(path()));
   part("direction").oninput = () => guarded(() => (test.turn(Number(part("direction").value)), compare()));
   part("hold").onchange = () => guarded(() => {
     test.hold = part("hold").value;
@@ -185,7 +185,7 @@ function listen() {
   });
   part("level").oninput = () => setLevel(part("level").value / 400);
   for (const button of document.querySelectorAll("#joint [data-test]")) button.onclick = () => play(button.dataset.test);
-  const again = (before) => remake(legsOf(before));
+  const again = (before) => rebuild(legsFor(before));
   part("next").onclick = () => (story.go(story.at + 1, again), redraw());
   part("back").onclick = () => (story.go(story.at - 1, again), redraw());
   part("python").onclick = () => give(python(rockName(), numbers, test), "jointlaw.py", "This law and path in Python");
@@ -198,7 +198,7 @@ function listen() {
   new MutationObserver(redraw).observe(document.body, { attributeFilter: ["data-theme"] });
 }
 
-/* Call act(x, y) with the way of the one finger, or of the mouse with its first button */
+/* Call act(x, y) with the motion of one finger, or of the mouse with its first button pressed */
 function follow(place, act) {
   let from = null;
   place.onpointerdown = (event) => {
@@ -215,7 +215,7 @@ function follow(place, act) {
   place.onpointerup = place.onpointercancel = () => (from = null);
 }
 
-/* Pixels of the hand over those of the block */
+/* Motion of the block over motion of the pointer */
 const gear = () => (story.step && !story.isDone && story.step.gear) || 1;
 const hand = (x, y) => drag((gear() * x) / zoomOf(test), (gear() * y) / zoomOf(test));
 const turnHemisphere = (x) => ((spin += x / 80), redraw());
@@ -227,20 +227,20 @@ function key(event) {
   drag((way[0] * test.joint.length) / 20, (way[1] * test.joint.length) / 20);
 }
 
-/* Copy a text, or show it where the browser does not allow that; offer it as a file */
+/* Copy a text, or show it if the browser does not allow copying; offer it as a file */
 async function give(text, file, name) {
   part("text").value = text;
-  part("given").open = true;
+  part("copied").open = true;
   const link = part("file");
   link.hidden = !file;
   link.download = file;
   link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
   const copied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
-  part("given-name").textContent = copied ? `${name}: copied` : name;
+  part("copied-name").textContent = copied ? `${name}: copied` : name;
 }
 
-/* The joint that the address tells of, or that of the story's begin */
-function recall() {
+/* Restore the joint from the address, or start the tutorial */
+function restoreFromAddress() {
   const told = new URLSearchParams(location.hash.slice(1));
   if (told.get("rock") in JOINTLAW.rocks) part("preset").value = told.get("rock");
   begin();
@@ -251,13 +251,13 @@ function recall() {
     }
     if (told.has("path")) {
       const legs = legsOfText(told.get("path"));
-      remake(legs.length ? legs : legsOf([10]));
+      rebuild(legs.length ? legs : legsFor([10]));
       test.turn(Number(told.get("turn")) || 0);
       if (told.get("hold") === "closure") test.hold = "closure";
-    } else story.go(0, (before) => remake(legsOf(before)));
+    } else story.go(0, (before) => rebuild(legsFor(before)));
   } catch (error) {
     begin();
-    test.says = `The address is not one of this page (${error.message}); here is a new joint.`;
+    test.message = `The address is not valid (${error.message}); this is a new joint.`;
   }
 }
 
@@ -267,10 +267,10 @@ async function open() {
     exports = (await WebAssembly.instantiate(decoded(JOINTLAW.wasm), {})).instance.exports;
     for (const one of Object.values(JOINTLAW.rocks)) one.bytes = decoded(one.tables);
     listen();
-    recall();
+    restoreFromAddress();
     redraw();
   } catch (error) {
-    part("says").textContent = `The joint cannot be shown: ${error.message}.`;
+    part("message").textContent = `The joint cannot be shown: ${error.message}.`;
     throw error;
   }
 }

@@ -1,10 +1,10 @@
 /* Pictures of a test: the two faces, curves, and the facets on a hemisphere. */
 
 const part = (name) => document.getElementById(`joint-${name}`);
-const COLOURS = ["ink", "faint", "line", "rock", "over", "stuck", "sliding", "apart", "coulomb", "barton"];
+const COLOURS = ["ink", "faint", "line", "rock", "over", "stuck", "sliding", "separated", "coulomb", "barton"];
 let colours = {};
 
-/* A canvas made ready for one picture, in CSS pixels */
+/* Prepare a canvas for one picture, in CSS pixels */
 function canvas(name) {
   const place = part(name), ratio = window.devicePixelRatio || 1;
   const wide = place.clientWidth, high = place.clientHeight;
@@ -27,7 +27,7 @@ function readColours() {
 
 const scale = (length) => length >= 1e-4 ? [1e3, "mm"] : length >= 5e-8 ? [1e6, "µm"] : [1e9, "nm"];
 
-/* Three digits; 0 for what is rounding beside numbers of this size */
+/* Three digits; 0 for rounding errors of numbers of this size */
 const three = (x, size = 1) => (Math.abs(x) < 1e-6 * size ? "0" : String(Number(x.toPrecision(3))));
 
 function niceStep(range, most) {
@@ -37,7 +37,7 @@ function niceStep(range, most) {
 
 const tidy = (x, step) => (Math.abs(x) < step / 2 ? 0 : x).toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
 
-/* Lines against one another. lines: { x, y, colour, name, wide, pale } in the units of the labels;
+/* Draw lines in axes. lines: { x, y, colour, name, wide, pale } in the units of the labels;
  * smallest: range of each axis. A line that is pale has no mark at its end, and only a line that is
  * not pale makes the axes longer */
 function plot(name, xLabel, yLabel, lines, smallest) {
@@ -97,13 +97,13 @@ function plot(name, xLabel, yLabel, lines, smallest) {
   c.restore();
 }
 
-/* Every so many of the rows are drawn: more than a screen can show */
+/* Thin the rows to as many as a screen can show */
 const thinned = (rows, most = 1500) => {
   const every = Math.ceil(rows.length / most);
   return every < 2 ? rows : rows.filter((_, i) => i % every === 0 || i === rows.length - 1);
 };
 
-/* The curves of a test; simpler: those of other laws */
+/* Draw the curves of a test; simpler: curves of other laws */
 function drawCurves(test, simpler) {
   const [per, unit] = scale(test.joint.length), few = test.joint.length * per, rows = thinned(test.rows);
   const column = (some, key, factor) => some.map((row) => row[key] * factor);
@@ -133,7 +133,7 @@ function drawCurves(test, simpler) {
 }
 
 /* Facets as dots on the hemisphere that holds them all: its top is flat, its rim the steepest
- * inclination. Size tells the load, colour the state. spin: from where it is seen, rad */
+ * inclination. Size: load; colour: state. spin: rotation of the view, rad */
 function drawHemisphere(test, facets, a, spin) {
   const { c, wide, high } = canvas("facets"), R = Math.min(wide / 2 - 12, (high - 40) / 1.45);
   const x0 = wide / 2, y0 = high - 14 - R * 0.5, lift = Math.sqrt(0.75);
@@ -170,7 +170,7 @@ function drawHemisphere(test, facets, a, spin) {
     c.globalAlpha = 0.88;
     if (f.load > 0) c.fill();
     c.globalAlpha = 1;
-    c.strokeStyle = f.load > 0 ? "#0004" : colours.apart;
+    c.strokeStyle = f.load > 0 ? "#0004" : colours.separated;
     c.lineWidth = f.load > 0 ? 1 : 1.5;
     c.stroke();
   }
@@ -189,14 +189,14 @@ function frame(test) {
 }
 const zoomOf = (test) => frame(test).zoom;
 
-/* Which asperities stand for the joint: pairs of facets of one ring that face against the slip and
- * with it, and cells of all depths. gap: before the joint was closed */
+/* Choose asperities that represent the joint: pairs of facets that face against the slip and with it,
+ * with cells of all depths. gap: of the open joint */
 function chooseTeeth(test, count) {
   const [ex, ey] = test.along, { virgin, joint } = test;
   const tilts = virgin.map((f) => Math.atan2(f.n[1] * ex + f.n[2] * ey, f.n[0]));
   const flat = virgin.map((f) => Math.abs(f.n[2] * ex - f.n[1] * ey));
   const order = tilts.map((_, i) => i).filter((i) => flat[i] < 0.6 * Math.abs(Math.sin(tilts[i])) + 0.05);
-  const side = (sign) => { // those that are not too steep to be drawn, if there are any
+  const side = (sign) => { // not too steep for the picture, if possible
     const all = order.filter((i) => sign * tilts[i] > 1e-9).sort((i, j) => sign * (tilts[i] - tilts[j]));
     const low = all.filter((i) => Math.abs(tilts[i]) < 0.7);
     return low.length ? low : all.slice(0, 1);
@@ -210,13 +210,13 @@ function chooseTeeth(test, count) {
   });
 }
 
-/* The two faces. Below, each ramp has the inclination of its facet, and ends where its slope fades;
- * above, a tip hangs over each. Gaps, slip and closure are those of the law, enlarged alike; where a
- * tip is pressed against its ramp it lies behind it. mark: a state that is ringed */
+/* Draw the two faces. Below, each ramp has the inclination of its facet, and ends where its dilation has decayed;
+ * above, a tip hangs over each. Gaps, slip and closure of the law are enlarged by the same
+ * factor; a tip in contact overlaps its ramp. mark: a state to highlight */
 function drawScene(test, facets, mating, mark) {
   const { c, wide, high } = canvas("scene"), { count, pitch, zoom } = frame(test);
   const { along, slip, at } = test, R = Math.min(9, pitch / 9), half = pitch / 2;
-  const across = [at[1] - slip * along[0], at[2] - slip * along[1]]; // slip that is not in the picture
+  const across = [at[1] - slip * along[0], at[2] - slip * along[1]]; // slip normal to the picture
   const climb = (tooth, way) => { // height of the ramp (m) at a slip, from the middle
     const p = along.map((e, i) => across[i] + way * e), size = Math.hypot(...p) / mating;
     return (tooth.n[1] * p[0] + tooth.n[2] * p[1]) / tooth.n[0] / Math.sqrt(1 + size * size);
@@ -260,7 +260,7 @@ function drawScene(test, facets, mating, mark) {
   c.stroke();
   for (const { tip, facet, cell, tilt } of teeth) {
     const { gap, use } = facets[facet].cells[cell], [px, pz] = tip;
-    const state = gap >= 0 ? "apart" : use >= 1 ? "sliding" : "stuck";
+    const state = gap >= 0 ? "separated" : use >= 1 ? "sliding" : "stuck";
     const pressed = Math.min(2 * R, Math.max(0, -gap * zoom)), turn = Math.PI / 2 - tilt;
     c.strokeStyle = colours[state];
     c.lineWidth = 5;

@@ -1,27 +1,27 @@
-/* A test of a joint: what was done with it, the rows of what came out, and both as text. */
+/* A test of a joint: its loading path, the resulting rows, and both as text. */
 
-const REACH = 7; // the farthest slip, in closures at 10 MPa: as far as the picture goes
-const OPENING = 3; // the same of opening
-const FINEST = 1 / 100; // a step, in that closure: the path decides, not the speed of the hand
+const REACH = 7; // largest slip in the picture, in closures at 10 MPa
+const OPENING = 3; // largest opening, in the same unit
+const MAX_STEP = 1 / 100; // step in the same unit: results must not depend on the speed of the pointer
 const MOST_ROWS = 6000;
-const MOST_LEGS = 60; // that the address holds
+const MOST_LEGS = 60; // stored in the address
 
 class Test {
   constructor(joint) {
     this.joint = joint;
     this.hold = "stress"; // or "closure"
-    this.level = 0; // Pa, the normal stress that is held
+    this.level = 0; // Pa, prescribed normal stress
     this.at = [0, 0, 0]; // closure and slip along axes 2 and 3
     this.rows = [];
-    this.legs = []; // what was done: see `log`
-    this.turns = 0; // how often the direction was changed
-    this.says = ""; // why it stopped
+    this.legs = []; // loading path: see `log`
+    this.turns = 0; // number of changes of direction
+    this.message = ""; // reason for a stop
     joint.reset();
-    this.virgin = joint.look();
+    this.virgin = joint.facetStates();
     this.turn(0);
   }
 
-  /* The direction of slip, from axis 2 towards axis 3; the joint keeps its state */
+  /* Set the direction of slip, from axis 2 towards axis 3; the state of the joint does not change */
   turn(degrees) {
     const angle = (degrees * Math.PI) / 180;
     if (degrees !== this.degrees && this.rows.length) this.turns++;
@@ -33,20 +33,20 @@ class Test {
   get closure() { return this.at[0]; }
   get isOpen() { return this.joint.F[0] <= 0; }
 
-  /* Take the last trial of the joint. Returns false, and says why, where it would leave the picture
-   * or the tables */
-  take(hold, level) {
+  /* Accept the last trial of the joint. Returns false and sets a message if it would leave the picture or
+   * the tables */
+  accept(hold, level) {
     const { joint } = this, d = Array.from(joint.d), at = this.at.map((x, i) => x + d[i]);
     const far = Math.hypot(at[1], at[2]), before = Math.hypot(this.at[1], this.at[2]);
     if (joint.out[0] > FULL_STRESS * 1.001 && joint.out[0] > joint.F[0])
-      this.says = "The tables of this rock end at 20 MPa, and the block stops here.";
+      this.message = "The tables of this rock end at 20 MPa; the block stops here.";
     else if (far > REACH * joint.length && far > before)
-      this.says = "The picture ends here. Slide back, or begin a new joint.";
+      this.message = "The picture ends here. Slide back, or start a new joint.";
     else if (at[0] < -OPENING * joint.length && d[0] < 0)
-      this.says = "The joint is wide open. Move the block down again.";
+      this.message = "The joint is wide open. Move the block down again.";
     else {
       this.log({ hold, level, d, steps: 1, from: joint.F[0] });
-      joint.keep();
+      joint.commit();
       this.at = at;
       const { F } = joint, shear = F[1] * this.along[0] + F[2] * this.along[1];
       const row = { d, F, at, slip: this.slip, closure: at[0], normal: F[0], shear, turn: this.turns };
@@ -57,7 +57,7 @@ class Test {
     return false;
   }
 
-  /* Steps of one kind and direction become one leg: { hold, level, d (3), steps, from (Pa) } */
+  /* Combine steps of one kind and direction to a leg: { hold, level, d (3), steps, from (Pa) } */
   log(leg) {
     const last = this.legs.at(-1), slips = (one) => Math.hypot(one.d[1], one.d[2]) > 0;
     const size = (v) => Math.hypot(...v);
@@ -73,49 +73,49 @@ class Test {
     if (this.legs.length > 10 * MOST_LEGS) this.legs.shift(), (this.isShort = true);
   }
 
-  /* Go to a normal stress without slip; a joint that is open comes into touch first. A generator, as
-   * those below: it yields after each step */
+  /* Load to a normal stress without slip; an open joint closes first. This and the following functions
+   * are generators that yield after each step */
   *press(level) {
     const { joint } = this, step = joint.length / 50;
-    this.says = "";
+    this.message = "";
     while (level > 0 && this.isOpen && joint.trial([step, 0, 0])[0] === 0)
-      if (this.take("closure", 0)) yield;
+      if (this.accept("closure", 0)) yield;
       else return;
     const from = joint.F[0], count = from < 0.1 * level ? 40 : 20;
     for (let i = 1; i <= count && level !== from; i++) {
       const share = (i / count) ** (count === 40 ? 2 : 1), stress = from + (level - from) * share;
       joint.closing([0, 0], stress);
-      if (!this.take("stress", stress)) return;
+      if (!this.accept("stress", stress)) return;
       this.level = stress;
       yield;
     }
     this.level = level;
   }
 
-  /* Slip by so much in the direction, at the normal stress or at the closure that is held */
-  *slide(slip, steps = Math.ceil(Math.abs(slip) / (FINEST * this.joint.length) - 1e-9)) {
+  /* Slip in the direction, at the prescribed normal stress or closure */
+  *slide(slip, steps = Math.ceil(Math.abs(slip) / (MAX_STEP * this.joint.length) - 1e-9)) {
     const d = this.along.map((e) => (e * slip) / steps);
-    this.says = "";
+    this.message = "";
     for (let i = 0; i < steps; i++) {
       if (this.hold === "stress") this.joint.closing(d, this.level);
       else this.joint.trial([0, ...d]);
-      if (!this.take(this.hold, this.level)) return;
+      if (!this.accept(this.hold, this.level)) return;
       yield;
     }
   }
 
-  /* Move by so much, closure and slip, whatever stress that takes */
+  /* Prescribe increments of closure and slip */
   *move(closure, slip) {
-    const steps = Math.ceil(Math.hypot(closure, slip) / (FINEST * this.joint.length) - 1e-9);
-    this.says = "";
+    const steps = Math.ceil(Math.hypot(closure, slip) / (MAX_STEP * this.joint.length) - 1e-9);
+    this.message = "";
     for (let i = 0; i < steps; i++) {
       this.joint.trial([closure / steps, ...this.along.map((e) => (e * slip) / steps)]);
-      if (!this.take("closure", this.level)) return;
+      if (!this.accept("closure", this.level)) return;
       yield;
     }
   }
 
-  /* Do again what was done with another joint */
+  /* Repeat the legs of another test */
   *repeat(legs) {
     for (const { hold, level, d, steps } of legs) {
       const [closure, x, y] = d, size = Math.hypot(x, y);
@@ -132,7 +132,7 @@ class Test {
   }
 }
 
-/* The tests that can be played, on a joint that is seated: each yields after one step */
+/* Tests that can be played, on a loaded joint: each yields after one step */
 const PLAYED = {
   *closure(test) {
     const { level } = test;
@@ -152,15 +152,15 @@ const PLAYED = {
   },
 };
 
-/* Degrees of a slip (x, y), from 0 to below 180: which way along it is told by a sign */
+/* Direction of a slip (x, y) in degrees, from 0 to below 180; the sign of the slip gives its sense */
 const degreesOf = (x, y) => (Math.round((1e6 * (Math.atan2(y, x) * 180)) / Math.PI) / 1e6 + 360) % 180;
 
 const finish = (steps) => { for (const step of steps); };
 
-/* ------------------------------------------------------- what Coulomb and Barton-Bandis would say */
+/* --------------------------------------------------- Coulomb and Barton-Bandis for comparison */
 
-/* Shear stress over normal stress of a first shear by each, at slips >= 0 in closures at 10 MPa:
- * Coulomb's a spring and a slider, Barton and Bandis' the mobilised roughness of 1985 */
+/* Shear stress over normal stress in first shear, at slips >= 0 in closures at 10 MPa: Coulomb, a spring
+ * and a slider, and Barton-Bandis, the mobilised roughness of 1985 */
 const SIMPLER = {
   Coulomb: ([stiffness, friction]) => (x) => Math.min(stiffness * x, friction),
   "Barton-Bandis": ([peak, roughness], mu) => (x) => {
@@ -170,8 +170,8 @@ const SIMPLER = {
   },
 };
 
-/* Both curves, each fitted by least squares to a first shear of this joint, two closures long, at this
- * level and in this direction: [{ name, at (slip -> shear stress) }] */
+/* Both curves, fitted by least squares to the first shear of this joint over two closures, at this
+ * normal stress and direction: [{ name, at (slip -> shear stress) }] */
 function simplerLaws(test, mu, level) {
   const { joint } = test, kept = joint.snapshot(), x = [], y = [];
   const first = new Test(joint);
@@ -189,7 +189,7 @@ function simplerLaws(test, mu, level) {
   });
 }
 
-/* Two positive numbers that make `miss` least: a grid of factors that shrinks round the best */
+/* Two positive numbers that minimise a function: a grid of factors that shrinks around the best one */
 function fitted(miss, start) {
   let best = start, least = miss(start);
   for (let width = 2.5; width > 0.01; width *= 0.55) {
@@ -207,7 +207,7 @@ function fitted(miss, start) {
 
 const short = (x) => String(Number(x.toPrecision(7)));
 
-/* What was done, for the address: s (slip at a stress), n (to a normal stress), c (at a closure) */
+/* Legs as text, for the address: s (slip at a stress), n (to a normal stress), c (closure prescribed) */
 function legsAsText(legs) {
   if (legs.length > MOST_LEGS) return "";
   const words = ({ hold, level, d, steps }) => hold === "closure" ? ["c", ...d, steps]
@@ -231,7 +231,7 @@ function csv(test) {
 
 /* The same law and path in Python */
 function python(name, numbers, test) {
-  const own = numbersOf(JOINTLAW.rocks[name]), lines = [
+  const own = parametersOf(JOINTLAW.rocks[name]), lines = [
     "from dataclasses import replace", "import numpy as np", "import jointlaw as jl", "", `law = jl.presets.load("${name}")`];
   const changed = (key) => numbers[key] !== own[key];
   const turned = ["a", "c"].filter(changed).map((key) => `${key}=${numbers[key]}`);
@@ -241,7 +241,7 @@ function python(name, numbers, test) {
   if (changed("mating")) parts.push(`mating_length=${short(numbers.mating)}`);
   if (parts.length) lines.push(`law = replace(law, ${parts.join(", ")})`);
   lines.push("joint = law.joint()");
-  if (test.isShort) lines.push("# the first legs of this long path are no longer known");
+  if (test.isShort) lines.push("# the first legs of this long path are not stored");
   for (const { hold, level, d, steps, from } of test.legs) {
     const degrees = degreesOf(d[1], d[2]), angle = (degrees * Math.PI) / 180;
     const slip = d[1] * Math.cos(angle) + d[2] * Math.sin(angle);

@@ -1,5 +1,5 @@
 /* A direct shear test on one joint, printed as CSV: closed to a normal stress, then sheared along
- * axis 2 at that stress, back and forth.
+ * axis 2 at constant normal stress (CNL), with a reversal.
  *
  *     ./example [granite.jlaw [normal stress in Pa [shear in m]]]
  */
@@ -11,53 +11,53 @@
 
 static char message[JLAW_MESSAGE];
 
-static int failed(const char *what)
+static int fail(const char *reason)
 {
-  fprintf(stderr, "example: %s\n", what);
+  fprintf(stderr, "example: %s\n", reason);
   return 1;
 }
 
-/* A step with this shear whose closure keeps the normal stress: trials from the old state, and the
- * tangent tells how to better them (Newton). */
+/* One step with this shear increment at constant normal stress. The closure increment is found by
+ * Newton's method: trial steps from the old state, corrected by the tangent. */
 static int step_at_stress(const jlaw_law *law, double *state, double *next, double stress,
                           double shear, double *F)
 {
   double d[3] = {0.0, shear, 0.0}, C[9];
   for (int trial = 0; trial < 50; trial++) {
-    if (jlaw_update(law, state, next, d, F, C, message, sizeof message)) return failed(message);
+    if (jlaw_update(law, state, next, d, F, C, message, sizeof message)) return fail(message);
     if (fabs(F[0] - stress) <= 1e-9 * stress) {
       memcpy(state, next, (size_t) jlaw_state_size(law) * sizeof *state);
       return 0;
     }
     d[0] += (stress - F[0]) / (C[0] > 0.0 ? C[0] : jlaw_max_stiffness(law, state[0] + d[0]));
   }
-  return failed("the normal stress was not reached in 50 trials; take smaller steps");
+  return fail("the normal stress was not reached in 50 iterations; use smaller steps");
 }
 
-int main(int count, char **words)
+int main(int argc, char **argv)
 {
-  jlaw_law *law = jlaw_read(count > 1 ? words[1] : "granite.jlaw", message, sizeof message);
-  if (!law) return failed(message);
-  const double stress = count > 2 ? atof(words[2]) : 2e6, end = count > 3 ? atof(words[3]) : 2e-6;
+  jlaw_law *law = jlaw_read(argc > 1 ? argv[1] : "granite.jlaw", message, sizeof message);
+  if (!law) return fail(message);
+  const double stress = argc > 2 ? atof(argv[2]) : 2e6, end = argc > 3 ? atof(argv[3]) : 2e-6;
   const int dim = jlaw_dim(law), steps = 20;
   double *state = (double *) calloc((size_t) jlaw_state_size(law), sizeof *state);
   double *next = (double *) calloc((size_t) jlaw_state_size(law), sizeof *next);
-  double F[3], d[3] = {jlaw_closure(law, stress), 0.0, 0.0}, shares[3];
-  strcpy(message, state && next ? "asperities yield: give a smaller stress" : "there is no memory");
-  int wrong = !state || !next || !(d[0] >= 0.0)
+  double F[3], d[3] = {jlaw_closure(law, stress), 0.0, 0.0}, fractions[3];
+  strcpy(message, state && next ? "the law does not reach this normal stress: use a smaller one" : "no memory is left");
+  int failed = !state || !next || !(d[0] >= 0.0)
               || jlaw_update(law, state, state, d, F, NULL, message, sizeof message);
-  if (wrong) failed(message);
-  if (!wrong) printf("shear_um,closure_um,normal_MPa,shear_MPa,sliding,dissipated_J_m2\n");
-  for (int i = 1; !wrong && i <= (dim > 1 ? 2 * steps : 1); i++) {
+  if (failed) fail(message);
+  if (!failed) printf("shear_um,closure_um,normal_MPa,shear_MPa,sliding,dissipated_J_m2\n");
+  for (int i = 1; !failed && i <= (dim > 1 ? 2 * steps : 1); i++) {
     const double shear = i <= steps ? end / steps : -end / steps;
-    if (dim > 1) wrong = step_at_stress(law, state, next, stress, shear, F);
-    jlaw_contact_fractions(law, state, shares);
-    if (!wrong)
+    if (dim > 1) failed = step_at_stress(law, state, next, stress, shear, F);
+    jlaw_contact_fractions(law, state, fractions);
+    if (!failed)
       printf("%.3f,%.4f,%.4f,%.4f,%.4f,%.4f\n", dim > 1 ? 1e6 * state[1] : 0.0, 1e6 * state[0],
-             1e-6 * F[0], dim > 1 ? 1e-6 * F[1] : 0.0, shares[0], jlaw_dissipated_energy(law, state));
+             1e-6 * F[0], dim > 1 ? 1e-6 * F[1] : 0.0, fractions[0], jlaw_dissipated_energy(law, state));
   }
   free(next);
   free(state);
   jlaw_free(law);
-  return wrong;
+  return failed;
 }

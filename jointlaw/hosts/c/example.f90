@@ -43,7 +43,7 @@ program shear
   integer :: i
 
   law = jlaw_read('granite.jlaw'//c_null_char, message, length)
-  if (.not. c_associated(law)) call refuse()
+  if (.not. c_associated(law)) call stop_with_message()
   allocate (state(jlaw_state_size(law)), source=0.0_c_double) ! zeros: a virgin joint
   print '(a)', 'closure_um,shear_um,normal_MPa,shear_MPa'
   F = 0.0
@@ -51,12 +51,12 @@ program shear
     d = 0.0
     if (i <= 10) d(1) = 5e-8
     if (i > 10 .and. jlaw_dim(law) > 1) d(2) = 5e-8
-    if (jlaw_update(law, state, state, d, F, c_null_ptr, message, length) /= 0) call refuse()
+    if (jlaw_update(law, state, state, d, F, c_null_ptr, message, length) /= 0) call stop_with_message()
     print '(*(f8.4, :, ","))', 1e6*state(1), 0.05*max(i - 10, 0), 1e-6*F(1), 1e-6*F(2)
   end do
   call jlaw_free(law)
 contains
-  subroutine refuse() ! with the words before the zero that ends them
+  subroutine stop_with_message() ! print the message, up to its terminating zero
     integer :: at
     print '(300a)', (message(at), at=1, findloc(message, c_null_char, dim=1) - 1)
     stop 1

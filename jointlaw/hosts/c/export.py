@@ -16,8 +16,10 @@ from ...support.files import write_files
 FILES = ("jointlaw.c", "example.c", "example.cpp", "example.f90", "Makefile", "CMakeLists.txt",
          "README.md")  # fmt: skip
 HEADER = "jointlaw.h"
-_CONSTANT = "static JLAW_FUNCTION const"  # which on a device lies in its memory
-_TAKEN = re.compile(  # words of C and C++
+_CONSTANT = (
+    "static JLAW_FUNCTION const"  # qualifier of constants; on a GPU they are stored in its memory
+)
+_KEYWORDS = re.compile(  # of C and C++
     r"alignas|alignof|and|asm|auto|bitand|bitor|bool|break|case|catch|char|class|"
     r"compl|const|consteval|constexpr|constinit|continue|decltype|default|delete|do|"
     r"double|else|enum|explicit|export|extern|false|float|for|friend|goto|if|inline|"
@@ -26,65 +28,65 @@ _TAKEN = re.compile(  # words of C and C++
     r"static|struct|switch|template|this|throw|true|try|typedef|typeid|typename|"
     r"union|unsigned|using|virtual|void|volatile|while|xor"
 )
-_MODEL = "granite"  # the name of the tables in these files
+_NAME_IN_FILES = "granite"  # of the tables
 
 
 def export_c(
     law: Law, directory: str | Path, name: str = "joint", aperture: Aperture | None = None
 ) -> list[str]:
-    """Write all that a C or C++ code needs to run this law; the folder may be copied away.
+    """Write all files that a C or C++ code needs to run this law; the folder may be copied.
 
     >>> names = jl.export_c(law, "joint-for-c")
 
-    law: any law. directory: made if missing; files of the same names are replaced. name: of the
+    law: any law. directory: created if missing; files of the same names are replaced. name: of the
     tables, an identifier of C. aperture: its hydraulic aperture, for `jlaw_hydraulic_aperture`.
 
     Writes `jointlaw.h` (the law), `NAME.jlaw` (its tables, for `jlaw_read`), `NAME.h` (the same as
     constants), `jointlaw.c` (compiles the law), `example.c`, `example.cpp`, `example.f90`,
     `Makefile`, `CMakeLists.txt` and `README.md`. Returns the names. Raises ValueError for a name
-    that C cannot have or too many azimuths, before anything is written.
+    that is not valid in C or too many azimuths, before anything is written.
     """
     require_name(name)
     texts = {
         f"{name}.jlaw": table_text(law, aperture),
         f"{name}.h": header_text(law, name, aperture),
         HEADER: jointlaw_h(),
-        **{file: file_text(file).replace(_MODEL, name) for file in FILES},
+        **{file: file_text(file).replace(_NAME_IN_FILES, name) for file in FILES},
     }
     write_files(directory, texts)
     return list(texts)
 
 
 def file_text(file: str) -> str:
-    """A file of this folder, which has tables of the name granite."""
+    """Text of a file of this folder, in which the tables have the name granite."""
     return Path(__file__).with_name(file).read_text(encoding="utf-8")
 
 
 def require_name(name: str) -> None:
-    """Refuse a name of tables that C cannot have, or that a file of the law has."""
-    if not _free(name):
+    """Raise ValueError for a name of tables that is no identifier of C or reserved."""
+    if not _is_valid_name(name):
         raise ValueError(
             f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
-            "letter first, at most 41, and no word of C or C++; names of the law's own begin with "
+            "letter first, at most 41, and no keyword of C or C++; names of the header begin with "
             "jointlaw or jlaw"
         )
 
 
-def _free(name: str) -> bool:
-    named = re.fullmatch(r"(?!jointlaw|jlaw)[A-Za-z][A-Za-z0-9_]{0,40}", name)
-    return named is not None and not _TAKEN.fullmatch(name)
+def _is_valid_name(name: str) -> bool:
+    match = re.fullmatch(r"(?!jointlaw|jlaw)[A-Za-z][A-Za-z0-9_]{0,40}", name)
+    return match is not None and not _KEYWORDS.fullmatch(name)
 
 
 def identifier(text: str) -> str:
-    """A name for tables out of any text: letters, digits and underscores, a letter first."""
+    """Convert a text to a valid name of tables."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")[:40]
-    return name if _free(name) else f"joint_{name}".rstrip("_")
+    return name if _is_valid_name(name) else f"joint_{name}".rstrip("_")
 
 
 def table_text(law: Law, aperture: Aperture | None = None) -> str:
-    """The tables as text for `jlaw_read`: a keyword and its numbers a line, hexadecimal, exact.
+    """The tables as text for `jlaw_read`: keywords with exact hexadecimal numbers.
 
-    The last line holds a sum (FNV-1a) of the bytes before it, by which damage is told.
+    The last line holds a checksum (FNV-1a) of the preceding bytes.
     """
     numbers, arrays = packed(law)
     lines = [f"jointlaw tables {TABLE_FORMAT}", f"fingerprint {law.fingerprint}"]
@@ -94,7 +96,7 @@ def table_text(law: Law, aperture: Aperture | None = None) -> str:
         lines.append(key)
         lines += [" ".join(map(_exact, row.tolist())) for row in array.reshape(-1, 4)]
     text = "\n".join([*lines, ""])
-    return f"{text}sum {_sum(text.encode()):016x}\n"
+    return f"{text}sum {_checksum(text.encode()):016x}\n"
 
 
 def header_text(law: Law, name: str, aperture: Aperture | None = None) -> str:
@@ -133,23 +135,25 @@ def _parameters_as_comment(law: Law, aperture: Aperture | None = None) -> list[s
 
 
 def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
-    """Numbers and arrays of `struct jlaw_law` by name, in its order; refuses too many azimuths."""
+    """Numbers and arrays of `struct jlaw_law` by name, in its order.
+
+    Raises ValueError for too many azimuths."""
     facets = law.tables.asperities
-    if facets is not None and (most := ring_sizes(facets.theta).max()) > MAX_AZIMUTHS:
+    if facets is not None and (count := ring_sizes(facets.theta).max()) > MAX_AZIMUTHS:
         raise ValueError(
-            f"resolution.phi gives {most:g} azimuths on the circle: jointlaw.h takes at most "
+            f"resolution.phi gives {count:g} azimuths: jointlaw.h supports at most "
             f"{MAX_AZIMUTHS}; lower it"
         )
     return pack(law.tables)
 
 
 def _exact(value: float) -> str:
-    """A hexadecimal float without a point, which locales write each in their own way."""
+    """A hexadecimal float without a decimal point, which would depend on the locale."""
     mantissa, exponent = math.frexp(value)
     return f"{int(mantissa * 2**53):#x}p{exponent - 53}"
 
 
-def _sum(data: bytes) -> int:
+def _checksum(data: bytes) -> int:
     """FNV-1a of 64 bits, without carriage returns."""
     value = 0xCBF29CE484222325
     for byte in data.replace(b"\r", b""):

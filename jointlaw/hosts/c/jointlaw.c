@@ -1,3 +1,3 @@
-/* The law, compiled once for all files of a program. */
+/* The law, compiled once for all files of a program */
 #define JOINTLAW_IMPLEMENTATION
 #include "jointlaw.h"

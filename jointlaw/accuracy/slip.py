@@ -43,7 +43,10 @@ class SlipResults(NamedTuple):
     is_mobilised: NDArray[np.bool_]
 
     def largest_differences(self, reference: "SlipResults") -> list[float]:
-        """Largest difference of the friction and of the dilation angle, in degrees."""
+        """Largest absolute differences in degrees of the friction and of the dilation angle.
+
+        Only steps with mobilised friction (`is_mobilised` of this object) count; else it is 0.
+        """
         differences = np.abs(
             [self.friction - reference.friction, self.dilation - reference.dilation]
         )
@@ -51,7 +54,10 @@ class SlipResults(NamedTuple):
 
 
 def max_slip(mating_length: float, closure_range: float) -> float:
-    """Slip (m) at which the tests reverse."""
+    """Slip (m) at which the slip tests reverse.
+
+    A multiple of the mating length, or of the closure range (m) for an infinite mating length.
+    """
     if math.isfinite(mating_length):
         return _MAX_SLIP_OVER_MATING_LENGTH * mating_length
     return _MAX_SLIP_OVER_CLOSURE_RANGE * closure_range

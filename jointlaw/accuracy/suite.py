@@ -113,7 +113,11 @@ class Suite:
     uncertainty: Array
 
     def errors(self, law: JointLaw) -> SuiteErrors:
-        """Errors of the law with another resolution or closure range."""
+        """Errors of a law with another resolution or closure range along the paths of this suite.
+
+        The traction errors of the standard paths, and of the slip tests if the suite has any; the
+        largest errors of friction and dilation angles in slip tests, NaN without them.
+        """
         traction = relative_errors(tractions(law, self.d), self.F)
         if self.slip is None:
             return SuiteErrors(traction, math.nan, math.nan)
@@ -248,7 +252,12 @@ def _weave(s: Array) -> Array:
 
 
 def _random_excursions(law: JointLaw, stress: float, count: int) -> Array:
-    """Points (steps, count, dim) in m of random paths."""
+    """Points (steps, count, dim) in m of reproducible random paths.
+
+    Every eighth path slips at random (`random_slip_path`). The others visit 4 to 10 random corners,
+    one of which is closed by one to two times `stress` (Pa); along straight legs and along smooth
+    curves in turn.
+    """
     rng = np.random.default_rng(_EXCURSION_SEED)
     R = law.closure_range
     s = np.arange(1, STEPS + 1) / STEPS
@@ -301,7 +310,12 @@ def _in_space(path: Array, azimuth: float) -> Array:
 
 
 def _control_stress(law: JointLaw, d: Array, at_constant_stress: Array, stress: float) -> Array:
-    """Increments d whose closures keep the normal stress (Pa) constant on the paths selected."""
+    """Copy of the increments d whose closures keep a constant normal stress on selected paths.
+
+    at_constant_stress: which paths, (paths,). From step STEPS/10 on, each closing increment of
+    these paths is replaced by the increment that keeps the joint at `stress` (Pa); their shear
+    and all other paths stay as they are.
+    """
     d = d.copy()
     selected = np.flatnonzero(at_constant_stress)
     condition = NormalCondition(stress, stress)

@@ -118,7 +118,12 @@ def _make_references(
 
 
 def _make_reference(law: JointLaw, bound: float, excursions: int) -> tuple[Suite, Resolution]:
-    """A suite and its reference resolution, whose error is half of `bound` if it can be."""
+    """Reference suite of a law, and its resolution.
+
+    The resolution is refined, in the direction (u, phi or depth) that matters most, by 1.5 times at
+    a time, until its own error is at most half of `bound`, or until it would have too many sliders;
+    then the error may be larger.
+    """
     best = finer = reference_resolution(law)
     max_sliders = _MAX_REFERENCE_SLIDERS * best.sliders
     while finer.sliders <= max_sliders:

@@ -70,7 +70,9 @@ class Tradeoff:
     named: dict[str, Resolution]
 
     def pareto_front(self) -> tuple[ResolutionCost, ...]:
-        """The resolutions with smaller largest errors than all with as few sliders."""
+        """The resolutions that no cheaper one equals: each has a smaller largest error than all
+        resolutions with at most as many sliders. In the order of their sliders.
+        """
         front: list[ResolutionCost] = []
         for row in sorted(self.rows, key=lambda row: (row.sliders, row.max_error)):
             if not front or row.max_error < (1.0 - EQUAL_ERRORS) * front[-1].max_error:
@@ -146,7 +148,11 @@ def _measure_cost(law: JointLaw, suite: Suite, joints: int, seconds: float) -> R
 
 
 def _time_update(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
-    """Minimum time of an update in ns per joint, over runs that take `seconds` in total."""
+    """Minimum time in ns per joint of updating a batch of n joints by random increments.
+
+    The minimum is over at least three repetitions, for about `seconds` in total. A batch that would
+    not fit into memory is measured with fewer joints. NaN for n = 0.
+    """
     if n == 0:
         return float("nan")
     n = min(n, max(MAX_TIMING_MEMORY // (8 * law.tables.rows), 1))

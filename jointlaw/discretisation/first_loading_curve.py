@@ -84,7 +84,11 @@ class FirstLoadingCurve(NamedTuple):
         return power * S, power * (DS + slope * S), DDS
 
     def _piece(self, y: Array) -> tuple[Array, Array, Array, Array]:
-        """Place within its piece, index of the piece, t and 1 - t of each y."""
+        """Place of each y (m) in the table.
+
+        Returns the position within its piece (0 to 1), the index of the piece, and t = v/(v + V)
+        and 1 - t, where v = sqrt(y).
+        """
         # the bounds keep the index in the table for an infinite or NaN y, whose force shows it
         v = np.sqrt(np.fmin(np.fmax(y, 0.0), _MAX_CLOSURE))
         t = v / (v + self.scale)
@@ -229,7 +233,11 @@ def _tabulate_energy(eta: float, scale: float, S: Array, exponent: float) -> Arr
 
 
 def _require_convex(eta: float, heights: HeightDistribution, highest: float) -> None:
-    """Refuse a "population" curve whose slope decreases up to, or at, the last asperity."""
+    """Raise ValueError if the slope of a "population" curve decreases on closure.
+
+    The curve is checked at closures up to slightly beyond `highest` (m), at which the last asperity
+    touches. "individual" curves are always convex and pass unchecked.
+    """
     if heights.formation == "individual":
         return
     start = np.geomspace(1e-9, 1e-3, 200)

@@ -40,7 +40,10 @@ def smooth_factor(y: Array, eta: float, heights: HeightDistribution) -> tuple[Ar
 
 
 def contact_exponent(heights: HeightDistribution) -> float:
-    """p of S ~ y^p if the density is infinite at the very point of contact, else 0."""
+    """Exponent p of S ~ y^p near first contact, for heights whose density is infinite there.
+
+    0 where some asperities are in contact from the start, or where the density is finite.
+    """
     r0 = heights.overlap
     highest = float(heights.breakpoints()[-1])
     if heights.cdf(r0) > 0:

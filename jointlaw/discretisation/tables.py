@@ -134,7 +134,11 @@ def facet_tables(
 
 
 def _curve_at_limits(curve: FirstLoadingCurve, cell_depth: Array) -> tuple[Array, Array]:
-    """First-loading force and slope at the cell limits (M, D + 1)."""
+    """Force and slope of the first-loading curve at the depth limits of cells, (M, D + 1) each.
+
+    Limits of unused cells stay at their marker. Slopes never decrease with depth, and the slope at
+    the upper side of depth zero counts as part of the first cell.
+    """
     is_used = cell_depth < UNUSED
     force, slope = curve.force(np.where(is_used, cell_depth, 0.0))
     force = np.where(is_used, force, cell_depth)

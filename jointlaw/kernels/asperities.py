@@ -114,6 +114,7 @@ class AsperityElement(Element):
         self.max_search_closure = self.first_loading.max_search_closure
 
     def numbers(self) -> dict[str, float]:
+        """Scalars of `struct jlaw_law` that belong to asperities, by their names in C."""
         k = self.k
         engagement_factor, engagement_limit = engagement_stiffness(k)
         can_be_unmated = k.interlock_decays and k.dim > 1
@@ -229,6 +230,7 @@ class AsperityElement(Element):
         return super().traction(delta, undegraded)
 
     def measures(self, delta: Array, state: Array) -> Measures:
+        """As `Element.measures`: a facet slides where all its cells are at their friction limit."""
         k = self.k
         now = self.unpack(state)
         elastic = evaluate_cells(k, effective_closure(k, delta, now.slope_retention))
@@ -331,7 +333,12 @@ def shear_work(F0: Array, F: Array, d: Array) -> Array:
 
 
 def effective_closure(k: FacetTables, delta: Array, slope_retention: Array) -> Array:
-    """Effective closure y = n . (closure, offset)/c1 of every facet (M, B)."""
+    """Effective closure y (M, B) in m of every facet: its normal approach over c1 = cos theta.
+
+    The sum m . (closure, offset), m = n/c1 being the facet normal scaled to a unit normal
+    component. `offset` computes the offset from the shear displacement `delta[1:]`; the retention
+    (B,) lowers the slopes of a law that degrades. Values below the underflow threshold become 0.
+    """
     y = k.m[0][:, None] * delta[0]
     for row, o in zip(k.m[1:], offset(k, delta[1:]), strict=True):
         y = y + row[:, None] * (slope_retention * o if k.degrades else o)
@@ -341,7 +348,12 @@ def effective_closure(k: FacetTables, delta: Array, slope_retention: Array) -> A
 def degrade(
     k: FacetTables, delta: Array, old: AsperityState, slope_retention: Array
 ) -> tuple[Array, Array]:
-    """Slider forces q and dissipated energy (B,) after slopes decrease to this retention (B,)."""
+    """Slider forces and dissipated energy after slopes decrease while the joint is at rest.
+
+    The slope retention falls from `old.slope_retention` to `slope_retention` (B,) at the
+    displacement `delta`, so facets lose effective closure. Returns the new slider forces q, of the
+    shape of `old.q`, and the energy (B,) in J/m2 that normal springs and sliders lose.
+    """
     indented = evaluate_cells(k, old.indentation) if k.yields else None
     before, after = (
         subtract_plastic(evaluate_cells(k, effective_closure(k, delta, retention)), indented)
@@ -480,7 +492,12 @@ def tangent_of_rotation(
     end: Planes,
     derivatives: PlaneDerivatives,
 ) -> Array:
-    """Part (dim, dim - 1, B) of the tangent by which the planes at the end of the step rotate."""
+    """Part (dim, dim - 1, B) of the tangent C that comes from the rotation of the facets' planes.
+
+    The planes at the end of a step turn with the shear displacement while interlock decays: normal
+    forces and slider forces turn with them, and the friction limit follows gamma. The columns
+    are the shear displacements; closure turns no plane.
+    """
     limited = np.sum(sliders.push * after.G, axis=2)  # derivative of q by log(gamma)
     by_gamma = np.einsum("eimb,emb->imb", end.basis, limited / end.gamma) / k.lam
     C = np.einsum("ijmb,mb->ijb", derivatives.n, k.area[:, None] * after.force)

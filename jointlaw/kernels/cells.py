@@ -28,7 +28,12 @@ class Cells(NamedTuple):
 
 
 def evaluate_cells(k: FacetTables, y: Array) -> Cells:
-    """First-loading curve at the effective closure y (M, B), and its part in every cell."""
+    """Force and stiffness of the first-loading curve, and of the springs of every cell.
+
+    y: effective closure (M, B) in m. Returns `Cells`: Phi and Phi' of each facet (M, B), and G and
+    kappa of each cell (M, D, B), to which only springs between the depth limits of the cell
+    contribute, as far as they are engaged at y.
+    """
     force, slope = k.curve.force(y)
     limits = [x[:, :, None] for x in (k.cell_depth, k.cell_force, k.cell_slope)]
     low, low_force, low_slope = (x[:, :-1] for x in limits)

@@ -21,7 +21,10 @@ def degrade_sliders(
 ) -> tuple[Array, Array]:
     """Slider forces q after slopes have decreased at rest, and dissipated energy (B,) in J/m2.
 
-    As in a zero increment: springs that disengage release their force, and friction limits q.
+    before, after: the cells before and after the decrease. strength: friction limit of |q| over G.
+    Each force is multiplied by kappa after/kappa before, the share of its springs that is still
+    engaged, where that ratio is below one; then it is limited by friction at the new G. The energy
+    that both discard is dissipated.
     """
     remaining = np.minimum(after.kappa * reciprocal(before.kappa), 1.0)
     remaining = np.where(after.kappa < before.kappa, remaining, 1.0)

@@ -52,7 +52,11 @@ def allocate_blocks(n: int, rows: int, lanes: int = JOINTS_PER_BLOCK) -> Array:
 
 
 def block_index(state: Array, joints: Index, rows: Any = slice(None)) -> tuple[Index, Any, Index]:
-    """Index into the blocks `state` of these rows of these joints: (joints, rows)."""
+    """Index that selects rows of some joints from an array of states in blocks.
+
+    state: (blocks, rows, lanes). joints: numbers of joints, (n,). rows: a slice selects all those
+    rows, so that `state[index]` has the shape (n, rows).
+    """
     block, lane = np.divmod(joints, state.shape[2])
     return block, rows, lane
 

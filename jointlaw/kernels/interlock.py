@@ -53,9 +53,12 @@ def offset(k: FacetTables, p: Array) -> Array:
 
 
 def first_touch(k: FacetTables) -> Array:
-    """Displacement (dim,) in m of an unmated joint at first touch, sheared along axis 2.
+    """Displacement (dim,) in m at which the faces of an unmated joint first touch.
 
-    Raises ValueError for asperities that always interlock.
+    Its shear is 10 mating lengths or more along axis 2, where interlock is lost. Its closure is
+    negative: the joint is open by the height of the facet that touches first, and a little more,
+    so that no facet bears. Raises ValueError for a law with `closure_only` or with an infinite
+    mating length, whose faces always interlock.
     """
     if k.dim == 1:
         raise ValueError("mated=False: a joint with closure_only is always mated")
@@ -71,7 +74,12 @@ def first_touch(k: FacetTables) -> Array:
 
 
 def planes(k: FacetTables, p: Array, slope_retention: Array) -> Planes:
-    """The planes at the in-plane displacement p (dim - 1, B) and this slope retention (B,)."""
+    """Gradients, normals, tangents and friction factor gamma of the facets' planes.
+
+    p: in-plane displacement (dim - 1, B) in m; slope_retention: (B,). A facet's slope along p
+    decays with slip where interlock decays. Without decay the planes are constant, and the arrays
+    have length one along B.
+    """
     if not k.interlock_decays:
         one = np.ones((1, 1))
         return Planes(k.m[:, :, None], k.n[:, :, None], np.stack([k.s, k.t])[..., None], one)

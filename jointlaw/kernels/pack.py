@@ -47,7 +47,11 @@ def pack(k: LawTables) -> tuple[dict[str, int | float], dict[str, Array]]:
 def _facet_arrays(
     k: FacetTables, plastic_correction: tuple[Array, Array] | None
 ) -> dict[str, Array]:
-    """Arrays of the facets in blocks; plastic_correction: as of `FirstLoadingResponse`."""
+    """Arrays `facet`, `depth`, `curve` and `energy` of `struct jlaw_law`, by name.
+
+    Columns of facets are in blocks of FACET_LANES facets, padded by zeros. plastic_correction:
+    factors and depths as in `FirstLoadingResponse`, or None for asperities that do not yield.
+    """
     columns = {
         "M": k.m.T,
         "S": k.s.T,
@@ -84,14 +88,21 @@ def _facet_arrays(
 
 
 def ring_sizes(theta: Array) -> Array:
-    """Number of facets (M,) with the inclination of each facet, which follow one another."""
+    """Number of facets in the ring of each facet, as floats (M,).
+
+    theta: inclinations (M,). Facets with equal inclination form a ring; they are consecutive.
+    """
     _, first, count = np.unique(theta, return_index=True, return_counts=True)
     sizes = count[np.argsort(first)]
     return np.repeat(sizes, sizes).astype(float)
 
 
 def _mirror_facets(n: Array) -> Array:
-    """Index of the facet (M,) whose normal has the opposite sign along axis 2."""
+    """Index (M,), as floats, of the facet that mirrors each facet at the plane normal to axis 2.
+
+    n: facet normals (dim, M). The mirror image is sought within the ring of the facet, so that the
+    time and memory grow with the size of rings, not with M squared.
+    """
     image = n * np.where(np.arange(len(n)) == 1, -1.0, 1.0)[:, None]
     mirrors = []
     # within rings of one inclination, which follow one another: else memory grows as M squared

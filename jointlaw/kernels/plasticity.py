@@ -25,13 +25,21 @@ from .interlock import Planes
 
 
 def update_indentation(k: FacetTables, indentation: Array, y: Array) -> Array:
-    """Plastic indentation (M, B) of every facet once the closures y (M, B) are reached."""
+    """Plastic indentation (M, B) in m of every facet once the closures y (M, B) are reached.
+
+    It never decreases. Two opposite facets are the two sides of one asperity: both take the larger
+    of their indentations, the closure beyond the yield depth.
+    """
     single = np.maximum(indentation, y - k.yield_depth[:, None])
     return np.maximum(single, single[k.opposite])
 
 
 def subtract_plastic(elastic: Cells, indented: Cells | None) -> Cells:
-    """Cells at y less the cells at the plastic indentation; `elastic` itself for None."""
+    """Forces and stiffnesses of cells whose springs are plastically indented.
+
+    The values at y less the values at the indentation, both on the first-loading curve; zero where
+    y is at most the indentation. `elastic` is returned as it is where `indented` is None.
+    """
     if indented is None:
         return elastic
     compression = elastic.y - indented.y

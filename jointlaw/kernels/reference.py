@@ -168,7 +168,9 @@ def stiffness(k: LawTables, state: Array) -> Array:
 
 
 def measures(k: LawTables, state: Array) -> Measures:
-    """Measures of a batch of states (rows, B)."""
+    """`Measures` of a batch of states (rows, B): all of the first element, whose stored energy is
+    replaced by the sum over elements.
+    """
     delta = state[: k.dim]
     (first, (rows,)), *remaining = k.element_rows(state)
     result = first.measures(delta, rows)

@@ -70,6 +70,10 @@ def engagement_stiffness(k: FacetTables) -> tuple[float, float]:
 
 
 def largest_climb(k: FacetTables, shear: Array) -> Array:
-    """Largest increase (..., M) in m of the closure of each facet by shear (...) in m."""
+    """Largest increase (..., M) in m of the effective closure of each facet by shear.
+
+    shear: displacement (...) in m in any direction. The facet's slope times the offset of this
+    shear, limited by the mating length.
+    """
     climb = shear / np.hypot(1.0, shear / k.mating_length)
     return climb[..., None] * np.linalg.norm(k.m[1:], axis=0)

@@ -115,7 +115,10 @@ def read_law(options: argparse.Namespace) -> Any:
 
 
 def read_aperture(name_or_file: str) -> Aperture | None:
-    """The hydraulic aperture in a law file; None for a preset or a file without [aperture]."""
+    """The hydraulic aperture in a law file.
+
+    None for a preset, for a file without the table [aperture], and for a path without a file.
+    """
     path = Path(name_or_file)
     if name_or_file in presets.names() or not path.is_file():
         return None
@@ -124,7 +127,11 @@ def read_aperture(name_or_file: str) -> Aperture | None:
 
 
 def _read_law_file(path: Path, default_rock: bool) -> Any:
-    """The law in a TOML file; contacts of `ROCK` complete a file without [asperity] on request."""
+    """The law in a TOML file.
+
+    A file without [asperity] gets the contacts of the default rock if `default_rock` is True; else
+    ValueError names the missing table. Coulomb's laws are read as they are.
+    """
     tables = keys.read(path, "law file")
     if tables.get("kind") == "coulomb":
         return JointLaw.from_dict(tables, str(path))

@@ -32,7 +32,11 @@ def _export(
     folder: str,
     options: argparse.Namespace,
 ) -> str:
-    """Write the files of a host; returns the text for the user."""
+    """Write the files of a host into `folder`.
+
+    Returns the text for the user: the report of the host if it has one, else the names of the
+    files.
+    """
     arguments = {one.keyword: getattr(options, one.keyword) for one in host.options}
     arguments["aperture"] = aperture
     if host.names_tables:

@@ -139,7 +139,12 @@ def _refuse(options: argparse.Namespace, names: Sequence[str], subject: str) -> 
 
 
 def _read_closure(options: argparse.Namespace) -> tuple[list[ClosureCurve], HeldOut | None]:
-    """The closure curve to fit, if there is one, and the points above --up-to."""
+    """The closure curve to fit, and the points above --up-to, which are held out.
+
+    Without --cycle only first loading is fitted, and a note of the curve says how many rows were
+    left out. No curve without a closure file; None instead of `HeldOut` if all points are fitted.
+    The closure of held-out points is corrected by the compliance of the rock.
+    """
     if not options.data:
         return [], None
     item = options.data[0]

@@ -85,7 +85,10 @@ def _run_test(
     law: JointLaw,
     options: argparse.Namespace,
 ) -> None:
-    """Run a test and write its record, also the record of a test that stopped early."""
+    """Run a test and write its record.
+
+    A PathError is raised again after the record up to it was written, if that has any row.
+    """
     try:
         record = test()
     except PathError as error:

@@ -38,7 +38,11 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _report_friction(fit: SurfaceFit, z: Array) -> str:
-    """Friction angles of the surface at two sampling lengths (Markdown)."""
+    """Markdown table of friction angles of the surface at two sampling lengths.
+
+    The second is the first times SAMPLING_LENGTH_RATIO; a length at which asperities cannot be
+    fitted has the reason in its row.
+    """
     rows = []
     for length in (fit.asperities.size, SAMPLING_LENGTH_RATIO * fit.asperities.size):
         try:

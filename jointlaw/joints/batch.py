@@ -98,7 +98,12 @@ class JointBatch:
         return F, C
 
     def advance(self, step: Step) -> None:
-        """Advance by a step whose arrays have the shapes of this batch. Raises as `update`."""
+        """Advance joints by a prepared step, in place, without copies.
+
+        The arrays of `step` have the shapes of this batch: F, and C and measures where they are not
+        None, are filled. With `step.commit` False the joints stay in their states, as in `trial`.
+        Raises as `update`, before any joint changes.
+        """
         closure_bound = self._closure_bound_after(step)
         self._engine.advance(self._state, step, self.track_dissipation)
         if step.commit:
@@ -171,9 +176,10 @@ class JointBatch:
             self._state[block_index(self._state, self._index(index), row)] = damage
 
     def resize(self, n: int) -> None:
-        """Change the number of joints to n; joints beyond the old number are new and mated.
+        """Change the number of joints to n; the first joints keep their states.
 
-        Raises ValueError where n is no whole number >= 0.
+        Joints beyond the old number are new and mated, also where the batch was larger before.
+        Memory is never released. Raises ValueError where n is no whole number >= 0.
         """
         n = integer("n", n, 0)
         capacity, rows, lanes = self._state.shape
@@ -281,7 +287,7 @@ class JointBatch:
         return copy.reshape(-1, *joints_first.shape[2:])[: self._n]
 
     def _tracked_row(self, name: str) -> Array:
-        """A row of dissipated energy, if it is tracked."""
+        """A row of dissipated energy (n,). Raises AttributeError if it is not tracked."""
         if not self.track_dissipation:
             raise AttributeError(
                 f"{name} is not tracked: make the joints with track_dissipation=True"
@@ -315,7 +321,11 @@ class JointBatch:
         return index.astype(np.intp)
 
     def _closure_bound_after(self, step: Step) -> float:
-        """Bound of |y| after a step. Raises if it is not finite, or if forces would overflow."""
+        """Upper bound (m) of |y| over all joints and facets after a step.
+
+        A cheap bound over all joints is tried first, and single joints only where it exceeds the
+        largest effective closure of the law. Raises as `_closure_bound_by_joint`.
+        """
         d = step.d
         limit = self.law.max_effective_closure
         if d.size <= MAX_SIZE_IN_PYTHON:  # the sum of sizes is a bound too; NaN if any is NaN
@@ -326,7 +336,11 @@ class JointBatch:
         return bound if bound <= limit else self._closure_bound_by_joint(step, limit)
 
     def _closure_bound_by_joint(self, step: Step, limit: float) -> float:
-        """As `_closure_bound_after`, joint by joint."""
+        """As `_closure_bound_after`, from the displacement and the increment of every joint.
+
+        Raises ValueError for an increment that is not finite, and NonFiniteError (with number,
+        state and increment of the joint) where forces would overflow.
+        """
         d = step.d
         index = step.where
         delta = self.delta if index is None else self.delta[index]

@@ -114,7 +114,10 @@ class JointPool:
             _ = self.batch.law.unmated_start
 
     def remove(self, keys: Iterable[Hashable]) -> None:
-        """Remove the contacts of these `keys`. Raises KeyError for a key without a contact."""
+        """Remove the contacts of these `keys`; a key that is given twice is removed once.
+
+        Raises KeyError for a key without a contact, and then removes none.
+        """
         removed = list(dict.fromkeys(keys))
         places = [self._place[key] for key in removed]
         self._release(places)

@@ -28,7 +28,10 @@ class JointState:
         return len(self.values)
 
     def require(self, fingerprint: str) -> None:
-        """Check that the law of this fingerprint wrote the state; raises ValueError if not."""
+        """Raise ValueError unless the law with this fingerprint wrote the state.
+
+        The message distinguishes another version of the discretisation from other parameters.
+        """
         if self.fingerprint == fingerprint:
             return
         own_version = self.fingerprint.partition(":")[0]

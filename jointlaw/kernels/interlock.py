@@ -55,7 +55,7 @@ def offset(k: FacetTables, p: Array) -> Array:
 def first_touch(k: FacetTables) -> Array:
     """Displacement (dim,) in m at which the faces of an unmated joint first touch.
 
-    Its shear is 10 mating lengths or more along axis 2, where interlock is lost. Its closure is
+    Its shear is 100 mating lengths along axis 2, where no interlock is left. Its closure is
     negative: the joint is open by the height of the facet that touches first, and a little more,
     so that no facet bears. Raises ValueError for a law with `closure_only` or with an infinite
     mating length, whose faces always interlock.

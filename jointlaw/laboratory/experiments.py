@@ -166,7 +166,7 @@ class _Test:
         self.append_row(F)
 
     def append_row(self, F: Array) -> None:
-        """Append a row with the state of the joint and its traction F."""
+        """Append a row: displacement, the traction F (dim,) and measures of the joint."""
         joint = self.joint
         measures = joint.measures()
         scalars = (
@@ -178,7 +178,7 @@ class _Test:
         self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *scalars]))
 
     def record(self) -> TestRecord:
-        """The record of all rows so far."""
+        """The record of all rows so far; warns where the law closed beyond its closure range."""
         table = np.array(self.rows).reshape(-1, len(UNITS))
         warn_if_closed(self.joint.law, table[:, 0])
         return TestRecord(dict(zip(UNITS, table.T, strict=True)), self.azimuth, self.name)

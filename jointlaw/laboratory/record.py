@@ -126,7 +126,11 @@ class TestRecord:
 
     @property
     def dilation_angle(self) -> Array:
-        """Dilation angle atan(opening/slip) of the step of each row in degrees; 0 without slip."""
+        """Dilation angle atan(opening/slip) in degrees of the step that leads to each row, (rows,).
+
+        The opening is the decrease of the closure in the step, the slip the absolute change of the
+        shear displacement. 0 in the first row and in steps without slip.
+        """
         slip = np.abs(np.diff(self.shear, prepend=self.shear[0]))
         opening = -np.diff(self.closure, prepend=self.closure[0])
         slips = slip > _MIN_SLIP * np.max(np.abs(self.shear))

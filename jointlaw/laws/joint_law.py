@@ -276,7 +276,12 @@ class JointLaw(Law, kind="joint"):
         return LawTables(len(asperities.m), tuple(elements))
 
     def _default_closure_range(self) -> float:
-        """The closure (m) at 20 MPa of elastic asperities: yielding ones may not bear it."""
+        """Closure (m) at a normal stress of 20 MPa, from the elastic response of the asperities.
+
+        Yielding is left out, because asperities that yield may not bear this stress at all; the
+        resolution of the law has no influence. Raises ValueError for parameters whose forces
+        overflow.
+        """
         p = self.asperity
         r = resolve("balanced")  # whatever the law's resolution
         nodes = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)

@@ -68,7 +68,9 @@ class Compiler(NamedTuple):
 
     @property
     def machine(self) -> tuple[str, str]:
-        """Processor and operating system of the compiled code."""
+        """Processor ("x86_64", "aarch64") and system ("linux", "macos", "windows") of the compiled
+        code.
+        """
         if self.target:
             processor, system = self.target.split("-")[:2]
             return processor, system.partition(".")[0]
@@ -104,7 +106,10 @@ class Compiler(NamedTuple):
 
 
 def zig(target: str = "") -> Compiler:
-    """The compiler of the package `ziglang`, for this machine or a target of `TARGETS`."""
+    """The compiler of the package `ziglang`.
+
+    target: a target of `TARGETS`; "" compiles for this machine, on Linux for glibc 2.17 and later.
+    """
     command = (sys.executable, "-m", "ziglang", "cc")
     if target:
         return Compiler((*command, "-target", target), target)
@@ -175,7 +180,10 @@ def hash_sources() -> str:
 
 
 def write_headers(folder: Path = BUILT) -> None:
-    """Write layout.h, for the library, and jointlaw.h, for host codes."""
+    """Write layout.h, for the library, and jointlaw.h, for host codes, into `folder`.
+
+    The folder is made if it does not exist; files of these names are overwritten.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "layout.h").write_text(layout.layout_h(), encoding="utf-8")
     (folder / "jointlaw.h").write_text(layout.jointlaw_h(), encoding="utf-8")
@@ -195,7 +203,11 @@ class Unit(NamedTuple):
 
 
 def translation_units(levels: Iterable[int]) -> list[Unit]:
-    """All units of a library for these vector widths; batch.c is compiled twice for each."""
+    """All sources of a library with the vector width and the defines of each.
+
+    batch.c is compiled twice per width in `levels` (doubles per vector): for joints side by side in
+    vectors, and for facets of one joint side by side.
+    """
     baseline = min(LEVELS)
     identity = (f"-DJLAW_LEVELS={sum(levels)}", f'-DJLAW_SOURCES="{hash_sources()}"')
     units = [

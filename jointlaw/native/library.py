@@ -49,7 +49,11 @@ def load() -> ctypes.CDLL | None:
 
 
 def load_file(path: Path) -> ctypes.CDLL:
-    """Load the library at this path; raises UnfitLibraryError as `load` does."""
+    """Load and check the library at this path.
+
+    Raises UnfitLibraryError for a file that is no library for this machine, that was built from
+    other sources than the installed ones, or whose vectors are wider than this processor supports.
+    """
     try:
         library = ctypes.CDLL(str(path))
     except OSError as error:
@@ -71,7 +75,7 @@ def load_file(path: Path) -> ctypes.CDLL:
 
 
 def vector_lanes(library: Any) -> int:
-    """Doubles in the widest vector that both library and processor support; 0 if there is none."""
+    """Number of doubles in the widest vector that library and processor support; 0 for none."""
     of_processor = library.jlaw_lanes()
     of_library = library.jlaw_levels()
     supported = (n for n in build.LEVELS if n <= of_processor and n & of_library)

@@ -87,7 +87,11 @@ def sliding_angle(kn: float, ks: float, mu: float) -> float:
 
 
 def shear_stiffness(orientation: HasShape, kn: float, ks: float, azimuth: float) -> float:
-    """Resultant elastic shear stiffness C_s/N in N/m along an azimuth (rad): Eq. 28."""
+    """Resultant elastic shear stiffness in N/m per asperity along an azimuth (rad): Eq. 28.
+
+    kn, ks: normal and shear stiffness of an asperity in N/m. Returns the norm of the shear force
+    per unit displacement, not only its component along the displacement.
+    """
     azimuth = number("azimuth", azimuth)
     _, c22, c33 = elastic(orientation, kn, ks)
     return math.hypot(c22 * math.cos(azimuth), c33 * math.sin(azimuth))

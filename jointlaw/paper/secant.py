@@ -102,7 +102,10 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
 
 
 def contact_fraction(law: JointLaw, closure: ArrayLike) -> Any:
-    """Fraction of asperities in contact at a closure (m), P(r0 + delta_1); 1 without heights."""
+    """Fraction of the asperities that are in contact at a closure (m); an array for an array.
+
+    The probability P(r0 + delta_1) of Eq. 12 for a law with heights, 1 for a law without.
+    """
     if law.heights is None:
         return np.ones_like(closure, float)[()]
     return law.heights.cdf(law.heights.overlap + np.asarray(closure))

@@ -82,7 +82,10 @@ class Aperture:
 
     @property
     def _transition(self) -> float:
-        """Closure (m) at which the hydraulic aperture equals `length`."""
+        """Closure (m) beyond which the hydraulic aperture decreases exponentially.
+
+        There the aperture equals `length`; at smaller closure it decreases by the closure itself.
+        """
         if self.hydraulic <= self.length:
             return self.at + self.length * math.log(self.hydraulic / self.length)
         return self.at + (self.hydraulic - self.length)

@@ -76,7 +76,9 @@ class GammaHeights:
         return special.gammainc(self.alpha + 1, np.maximum(r, 0.0) / self.beta)
 
     def breakpoints(self) -> Array:
-        """Heights in m, ascending, between which the density is smooth on one scale."""
+        """Quantiles of the heights in m, ascending from 0, down to both tails: limits of panels
+        within which a quadrature rule resolves the density.
+        """
         k = self.alpha + 1
         low = special.gammaincinv(k, _TAILS)
         high = special.gammainccinv(k, _TAILS[::-1])

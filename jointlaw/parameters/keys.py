@@ -79,7 +79,11 @@ def any_value(name: str, value: Any) -> Any:
 
 
 def keys_of(kind: Any) -> dict[str, Any]:
-    """Rules for a table with the fields of a dataclass, which validates their values itself."""
+    """Keys that a table may have for the fields of a dataclass, by `validate_table`.
+
+    Keys of fields without a default end in "!", because a table must have them. Any value is
+    accepted, because the dataclass validates values itself.
+    """
     rules = {}
     for item in fields(kind):
         is_required = item.default is MISSING

@@ -29,7 +29,7 @@ def load(name: str) -> JointLaw:
 
 
 def load_any(name_or_file: str) -> JointLaw:
-    """The law of a preset or of a TOML file.
+    """The law of a preset, or of a TOML file at this path. A preset takes precedence over a file.
 
     Raises ValueError for an unknown name, and for an invalid file.
     """

@@ -55,7 +55,9 @@ def remedy(name: Any, choices: Iterable[str], introduction: str = "choose one of
 
 
 def one_of(name: str, value: Any, choices: tuple[str, ...]) -> str:
-    """Return `value`. Raises ValueError unless it is one of the choices."""
+    """Return `value` as text. Raises ValueError, which suggests a similar choice, unless it is one
+    of the choices.
+    """
     if value not in choices:
         raise ValueError(f"{name} = {value!r} is unknown; {remedy(value, choices)}")
     return str(value)
@@ -106,7 +108,10 @@ def booleans(name: str, value: Any, n: int) -> NDArray[np.bool_]:
 
 
 def read_only(arrays: Arrays) -> Arrays:
-    """Make the arrays in a tuple read-only, since laws share them; returns the tuple."""
+    """Return the tuple itself, after its arrays were made read-only, because laws share them.
+
+    Members that are no arrays stay as they are.
+    """
     for array in arrays:
         if isinstance(array, np.ndarray):
             array.flags.writeable = False

@@ -92,7 +92,10 @@ def clear_run(folder: Path, patterns: Iterable[str] = ()) -> None:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write strict JSON: NaN and infinity become null, numpy numbers and arrays plain ones."""
+    """Write `data` as strict JSON to `path`, atomically.
+
+    NaN and infinity become null, numpy numbers and arrays plain numbers and lists.
+    """
     text = json.dumps(data, default=lambda array: array.tolist())
     finite = json.loads(text, parse_constant=lambda constant: None)
     replace_file(path, (json.dumps(finite, indent=2, ensure_ascii=False) + "\n").encode())

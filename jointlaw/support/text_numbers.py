@@ -45,7 +45,11 @@ class NumberFormat(NamedTuple):
     grouped: bool
 
     def value(self, cell: str) -> float:
-        """The number in a cell; NaN for other text and for an ambiguous number."""
+        """The number in a cell of this format.
+
+        NaN for a cell that is no number, and for one such as 1,234 that may have thousands or
+        decimals while the decimal mark is unknown.
+        """
         text = _GROUPED.sub("", cell.replace("−", "-"))
         if self.decimal is None and AMBIGUOUS_NUMBER.fullmatch(text):
             return np.nan
@@ -59,7 +63,12 @@ class NumberFormat(NamedTuple):
 
 
 def detect_format(cells: Iterable[str], decimal: str | None = None) -> NumberFormat:
-    """The number format that these cells show; `decimal`, "comma" or "point", overrides it."""
+    """The decimal mark and the grouping of thousands that the numbers in these cells use.
+
+    A mark is detected where a cell has one that cannot separate thousands; the point takes
+    precedence where both appear as decimal marks. The format has the decimal mark None where no
+    cell decides. decimal: "comma" or "point" overrides detection.
+    """
     if decimal is not None:
         return NumberFormat(DECIMAL_MARKS[decimal], True)
     texts = {_GROUPED.sub("", cell) for cell in cells}
@@ -105,7 +114,12 @@ def find_separator(line: str) -> str | None:
 
 
 def find_table_separator(lines: dict[int, str]) -> str | None:
-    """The separator of a table with lines of text above it; removes a line sep=; from `lines`."""
+    """The separator of the columns of a table that has lines of text above it.
+
+    A line `sep=;` decides, and is removed from `lines`. Else the separator is that of the line of
+    names, the last line of letters above the first two rows of numbers, or of the line before it,
+    if that is a row of units. None where neither has one: then blanks separate.
+    """
     for number, line in lines.items():
         if line.lower().startswith("sep="):
             del lines[number]

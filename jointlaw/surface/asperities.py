@@ -113,7 +113,12 @@ def _require_several(summits: int, length: float) -> None:
 
 
 def _find_summits(z: Array, samples: int) -> NDArray[np.intp]:
-    """Grid indices (n, 2) of the summits, step 2 of `extract_asperities`."""
+    """Grid indices (n, 2) of the summits: step 2 of `extract_asperities`.
+
+    z: heights (ny, nx). A summit is the highest point within `samples` points of heights smoothed
+    over 3 by 3 points, at least `samples + RIM` points from the rim; of these 3 by 3 points the one
+    that is highest in z itself is returned.
+    """
     smooth = ndimage.uniform_filter(z, 3, mode="nearest")
     # a slight ramp, so that only one of several equal points is the maximum
     ramp = np.arange(z.size).reshape(z.shape) * (1e-12 * float(np.std(z)) / z.size + 1e-300)
@@ -150,7 +155,7 @@ def _fit_planes(
 
 
 def remove_mean_plane(z: Array) -> Array:
-    """Heights (ny, nx) relative to their mean plane."""
+    """Heights (ny, nx) less the plane that fits them best by least squares."""
     y, x = (np.linspace(-1.0, 1.0, n) for n in z.shape)
     level: Array = z - z.mean()
     level = level - np.outer(y, np.ones(x.size)) * (y @ level.sum(1) / (y @ y) / x.size)

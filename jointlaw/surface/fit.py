@@ -78,7 +78,11 @@ class SurfaceFit:
 
     @property
     def orientation_is_representative(self) -> bool:
-        """Whether the orientation is known and has the slopes of the surface within 20 %."""
+        """Whether a law with these a, b and c represents the slopes of the surface.
+
+        True where all three are identifiable and the rms slopes of the law, along and across the
+        rows, differ from the measured ones by at most 20 %.
+        """
         pairs = zip(self.slopes, self.law_slopes, strict=True)
         slopes_agree = all(
             abs(law - measured) <= MAX_SLOPE_DIFFERENCE * measured for measured, law in pairs

@@ -207,7 +207,11 @@ class JointTable:
 
     @cached_property
     def _harmonics(self) -> tuple[Array, Array, Array]:
-        """Mean and second harmonic over azimuth of the shear stiffness e.K.e, K symmetric."""
+        """Mean and amplitudes of cos 2 psi and sin 2 psi of the shear stiffness over azimuth psi.
+
+        Each (rows,) in Pa/m. They are the components of a symmetric 2 by 2 shear stiffness K by
+        row.
+        """
         kt = np.ascontiguousarray(self.shear_stiffness.T)
         c = np.cos(2 * self.azimuth[:, None]) * kt
         s = np.sin(2 * self.azimuth[:, None]) * kt
@@ -310,7 +314,11 @@ def interpolate_rows(values: Array, row: NDArray[np.intp], w: Array) -> Array:
 
 
 def interpolate_azimuths(values: Array, psi: Array, row: NDArray[np.intp], w: Array) -> Array:
-    """Linear interpolation in azimuth psi and between rows of values (rows, azimuths)."""
+    """Linear interpolation in the azimuth psi (n,) in rad and between rows of a table, (n,).
+
+    values: (rows, azimuths) for azimuths evenly spaced over half a circle, after which they repeat.
+    row, w: row below and weight of the row above, (n,) each.
+    """
     azimuths = values.shape[1]
     index, x = np.divmod(np.mod(psi, np.pi) * (azimuths / np.pi), 1.0)
     a = index.astype(int)

@@ -190,7 +190,13 @@ def _shear_stiffness(law: Any, u: Array, psi: Array) -> Array:
 
 
 def _friction(law: Any, u: Array, psi: Array, limit: float, steps: int) -> Array:
-    """Peak and final shear-to-normal ratio and final dilation (3, n, p), at constant stress."""
+    """Shear-to-normal ratios and dilation of joints sheared at constant normal stress.
+
+    Returns (3, n, p) for n closures u (m) before shear and p azimuths psi (rad): the largest ratio
+    on the way to the shear displacement `limit` (m), the ratio at the end, and the opening per
+    shear in the last of `steps` steps. It is simulated at FRICTION_ROWS closures and interpolated
+    to u.
+    """
     closures = np.geomspace(u[1], u[-1], FRICTION_ROWS)  # friction varies slowly with closure
     batch, along = _closed(law, closures, psi)
     normal = batch.F[:, 0]

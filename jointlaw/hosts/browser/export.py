@@ -50,7 +50,9 @@ def export_browser(directory: str | Path) -> Path:
 
 
 def script() -> str:
-    """The script of the page: tables of the presets, the law, tests and pictures."""
+    """JavaScript of the browser page: the tables of all presets and the law as WebAssembly, both as
+    text within a constant JOINTLAW, followed by the scripts of the page.
+    """
     about = {
         "numbers": {name: getattr(LawStruct, name).offset for name in (*INTEGERS, *REALS)},
         "begin": LawStruct.facet.offset,

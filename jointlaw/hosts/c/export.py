@@ -78,7 +78,11 @@ def _is_valid_name(name: str) -> bool:
 
 
 def identifier(text: str) -> str:
-    """Convert a text to a valid name of tables."""
+    """A valid C name made from any text, for tables.
+
+    Runs of other characters than letters and digits become one underscore; at most 40 characters.
+    "joint_" is put in front where the rest starts with a digit, or is a keyword or a name in use.
+    """
     name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")[:40]
     return name if _is_valid_name(name) else f"joint_{name}".rstrip("_")
 
@@ -100,7 +104,12 @@ def table_text(law: Law, aperture: Aperture | None = None) -> str:
 
 
 def header_text(law: Law, name: str, aperture: Aperture | None = None) -> str:
-    """The tables as constants of C: `&NAME` is the law, `&NAME_aperture` its hydraulic aperture."""
+    """Text of a C header whose constants are the tables of a law.
+
+    `&NAME` is the `jlaw_law`, and with `aperture` `&NAME_aperture` is its hydraulic aperture. The
+    header starts with the parameters as a comment, includes jointlaw.h, and refuses to compile with
+    a jointlaw.h of another table format. Raises ValueError as `packed` does.
+    """
     numbers, arrays = packed(law)
     comment = "\n".join(
         " * " + line.replace("*/", "* /") for line in _parameters_as_comment(law, aperture)
@@ -137,7 +146,9 @@ def _parameters_as_comment(law: Law, aperture: Aperture | None = None) -> list[s
 def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` by name, in its order.
 
-    Raises ValueError for too many azimuths."""
+    Raises ValueError for a law with more azimuths than the C text has room for, and for an element
+    without a C version.
+    """
     facets = law.tables.asperities
     if facets is not None and (count := ring_sizes(facets.theta).max()) > MAX_AZIMUTHS:
         raise ValueError(
@@ -148,13 +159,16 @@ def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
 
 
 def _exact(value: float) -> str:
-    """A hexadecimal float without a decimal point, which would depend on the locale."""
+    """Exact text of a float in C: a hexadecimal integer and a power of two.
+
+    It has no decimal point, which C reads by the locale.
+    """
     mantissa, exponent = math.frexp(value)
     return f"{int(mantissa * 2**53):#x}p{exponent - 53}"
 
 
 def _checksum(data: bytes) -> int:
-    """FNV-1a of 64 bits, without carriage returns."""
+    """Checksum of a file: FNV-1a of 64 bits over its bytes, except carriage returns."""
     value = 0xCBF29CE484222325
     for byte in data.replace(b"\r", b""):
         value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF

@@ -58,7 +58,7 @@ def export_yade(
 
 
 def describe_table(table: JointTable, law: Law) -> str:
-    """Size, content and errors of an exported table, for the user of the command."""
+    """Message of the export command: size, content and largest errors of the exported table."""
     angle_error = table.metadata["resolution_error_friction_angle"]
     return (
         f"wrote the joint for YADE: a table of {len(table.closure)} rows, law, adapter, script\n"

@@ -221,7 +221,10 @@ def _print_limit_analysis(scene: Scene) -> None:
 
 
 def _print_estimate(sim: Simulation, steps: int, until: float | None, with_pictures: bool) -> None:
-    """Print the estimated time of a run, unless its first steps end with an error."""
+    """Print the estimated time of a run, with its pictures if there are any.
+
+    Nothing is printed for a run without steps, or if the first steps of a copy end with an error.
+    """
     step_time = _step_time(sim)
     if not step_time or not steps:
         return
@@ -279,9 +282,12 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _check_stages(scene: Scene) -> None:
-    """Print the verdict on the equilibrium after each excavation stage, and the unstable blocks.
+    """Print a verdict for each excavation stage: does a static equilibrium exist after it?
 
-    Joints are taken without history, as if the stages were excavated before the loads act.
+    For each stage the blocks of it and of all earlier stages are removed, a simulation of the
+    remaining scene searches for its equilibrium, and limit analysis gives an upper bound; the
+    unstable blocks are listed. Joints are taken without history, as if the stages were excavated
+    before the loads act. A stage whose scene is invalid is reported as not examined.
     """
     removed = [*scene.removed]
     for number, stage in enumerate(scene.stages, 1):

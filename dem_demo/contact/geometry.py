@@ -67,9 +67,10 @@ class Outlines:
         self.edge_direction = np.empty(len(edge), complex)
 
     def step_arrays(self, motion: np.ndarray, contacts: int = 0) -> StepArrays:
-        """Arguments of the compiled step for these outlines.
+        """Arguments of the compiled step with the geometry of these outlines bound to them.
 
-        motion: (6, blocks); contacts: how many there are.
+        motion: (6, blocks), position, rotation and velocities of each block; contacts: how many
+        contacts there are.
         """
         arrays = StepArrays(
             n_blocks=len(self.first_corner) - 1,

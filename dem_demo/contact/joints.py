@@ -27,7 +27,11 @@ STATE_PARTS = "states", "fingerprint"  # saved for the joints of each law
 
 @lru_cache(maxsize=64)
 def tabulate_unmated_loading(law: jl.Law) -> dict[str, np.ndarray]:
-    """Closure since first touch (m) and work (J/m2) of a joint whose faces have never met."""
+    """First loading of a joint whose faces have never met, as columns "closure" and "work".
+
+    Closure since first touch (m), at the closures of the first-loading table of the law, and the
+    energy stored up to there (J/m2).
+    """
     closure = tabulate_first_loading(law)["closure"]
     batch = law.joints(len(closure), mated=False)
     batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
@@ -85,7 +89,11 @@ class LawJoints:
         self.silent_step = jl.Step(d, all_F, None)
 
     def allocate(self, m: int) -> np.ndarray:
-        """Places (m,) for new contacts."""
+        """Places (m,) for new virgin joints in the pool.
+
+        The pool grows where it is full; then the arrays of steps are made anew and must be bound
+        again.
+        """
         places = self.pool.allocate(m)
         if len(self.pool.batch) > len(self.step.d):
             self._make_steps(self.step.F, self.step.measures)
@@ -115,7 +123,10 @@ class LawJoints:
         return start
 
     def restore(self, state: jl.JointState) -> np.ndarray:
-        """Replace all joints by the joints of a snapshot; their places (n,)."""
+        """Replace all joints of this law by the joints of a snapshot, and their readings.
+
+        Returns the places (n,) of the joints in the pool, in the order of the snapshot.
+        """
         self.clear()
         places = self.allocate(len(state))
         batch = self.pool.batch
@@ -222,7 +233,10 @@ class Joints:
         self._arrange(law, place)
 
     def update(self, closure: np.ndarray, sliding: np.ndarray) -> None:
-        """Advance all joints to a closure (k,) and by a sliding (k,), m, in one step of the law."""
+        """Advance all joints to a closure (k,) and by a sliding displacement (k,), both in m.
+
+        They take one increment of their laws, which changes their states and readings.
+        """
         d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / self.reduction
         for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
             joints.step.d[self.place[rows]] = d[rows]
@@ -307,7 +321,11 @@ class Joints:
 
     @property
     def stiffness(self) -> np.ndarray:
-        """Upper bound (k,) of the stiffness at the present normal stress (Pa/m)."""
+        """Upper bound (k,) in Pa/m of the stiffness of each joint at its present normal stress.
+
+        From the first-loading curve of its law. Zero for a joint that bears no compression and
+        whose bond is broken.
+        """
         stress = self.traction[:, 0]
         bears_load = (stress > 0) | (self.damage < 1)
         return self.interpolate("stiffness", "stress", stress) * bears_load

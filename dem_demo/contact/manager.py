@@ -159,7 +159,12 @@ class ContactManager:
         return np.concatenate([rows, np.full(len(offset), -1)])
 
     def _blocks_to_rebuild(self, motion: np.ndarray) -> np.ndarray:
-        """Mask (blocks,) of blocks that have moved since their last rebuild, which is now."""
+        """Mask (blocks,) of the blocks whose contacts must be found again.
+
+        Blocks that have moved by more than a fraction of their skin since their last rebuild, and
+        blocks in `needs_rebuild`. Their present positions are recorded as those of the rebuild, and
+        `needs_rebuild` is cleared.
+        """
         x, y, rotation = motion[:3] - self.rebuilt_at
         distance = np.hypot(x, y) + np.abs(rotation) * self.radius
         has_rested = distance <= MOVED_FRACTION * self.skins  # false before the first rebuild

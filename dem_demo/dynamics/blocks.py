@@ -84,7 +84,11 @@ class Blocks:
         self._space.step(BROAD_PHASE_STEP)
 
     def neighbour_pairs(self) -> np.ndarray:
-        """Pairs (p, 2) of blocks whose gap is below the sum of their skins, approximately."""
+        """Pairs (p, 2) of blocks whose gap is less than the sum of their skins, sorted.
+
+        From the broad phase of pymunk at the present positions, which may add pairs with a slightly
+        larger gap. Removed blocks have no pairs.
+        """
         for i in np.flatnonzero(self.is_mobile).tolist():
             x, y, angle = self.motion[:3, i].tolist()
             self._bodies[i].position = x, y

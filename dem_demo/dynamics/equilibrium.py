@@ -233,7 +233,11 @@ class EquilibriumSearch:
         return np.hypot(x, y) + rotation * self.blocks.radius
 
     def _is_moving(self, growth: np.ndarray) -> np.ndarray:
-        """Blocks (n,) that move by more than a fraction of the fastest one."""
+        """Mask (n,) of blocks whose displacement in `growth` is more than a fraction of the largest
+        one.
+
+        growth: scaled displacements (n, 3).
+        """
         distance = self._distance(growth)
         return distance > UNSTABLE_FRACTION * distance.max(initial=0.0)
 

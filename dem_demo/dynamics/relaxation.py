@@ -221,9 +221,16 @@ class Relaxation:
         self.load *= self.is_free
 
     def relax(self, y: np.ndarray, finish: Callable[[np.ndarray], np.ndarray | None]) -> Relaxed:
-        """Relax from y (n, dof).
+        """Search for the equilibrium by dynamic relaxation from displacements y (n, dof).
+
+        Iterations of the compiled relaxation continue until Newton's method converges nearby, the
+        unbalanced force is rounding, the blocks move steadily, or MAX_ITERATIONS is reached; masses
+        grow where the iteration diverges.
 
         finish: Newton's method; returns the equilibrium that it finds near displacements, or None.
+
+        Returns the displacements, the growth of those that move, the verdict, the number of
+        iterations and the smallest unbalanced force.
         """
         none = np.zeros_like(y)
         self.first_force[:] = self.unbalanced(y)
@@ -272,7 +279,11 @@ class Relaxation:
         return bool(np.abs((solution - y) * self.is_free).max(initial=0.0) <= limit)
 
     def _restart(self, y: np.ndarray) -> None:
-        """Begin at rest at displacements y (n, dof), with the loads of the present iteration."""
+        """Continue at rest from displacements y (n, dof).
+
+        Velocities become zero. The unbalanced force is computed at y, less the fraction of the
+        initial unbalanced force that the ramp of this iteration still withholds.
+        """
         self.v[:] = 0.0
         fading = max(0.0, 1.0 - self.arrays.done / RAMP_ITERATIONS)
         self.force[:] = self.unbalanced(y) - fading * self.first_force * self.is_free
@@ -282,8 +293,12 @@ class Relaxation:
 
 
 def _steady_growth(sizes: list[float], places: list[np.ndarray]) -> np.ndarray | None:
-    """Growth of displacements in the last intervals, if it is steady while the unbalanced force no
-    longer falls; else None."""
+    """Growth (n, dof) of the displacements over the last intervals, if blocks move steadily.
+
+    sizes, places: unbalanced force and displacements at each check. None unless the smallest
+    unbalanced force no longer falls, and the displacements grow by a noticeable share and at least
+    about as fast as in the intervals before.
+    """
     n = COMPARED_INTERVALS
     if len(sizes) <= 2 * n:
         return None

@@ -164,7 +164,11 @@ class Simulation:
             drives.reverse(self.time, self.shear_displacement)
 
     def _move_blocks(self) -> None:
-        """Move the blocks and update their contacts; halve the time step for fast blocks."""
+        """Move the blocks by one step and update the geometry of their contacts.
+
+        While a block is too fast for the neighbour list, the time step is halved and the move
+        repeated; raises SceneError when it may not be halved any more.
+        """
         self.arrays.call("move_blocks", self.dt)
         while self.arrays.too_fast >= 0:
             if not self._halve_time_step():
@@ -179,7 +183,11 @@ class Simulation:
     # ------------------------------------------------------------------ excavation
 
     def _excavate(self) -> None:
-        """Begin the next stage when it is due, and release the support of removed blocks."""
+        """Begin the next excavation stage when it is due, and reduce the support of removed blocks.
+
+        A stage without a start time is due when the blocks are at rest. Checked only every
+        CHECK_INTERVAL steps; the support is reduced in every step.
+        """
         stages = self.scene.stages
         begun = int(np.isfinite(self.stage_start_times).sum())
         is_checked = self.steps_since_change % CHECK_INTERVAL == 0
@@ -226,7 +234,10 @@ class Simulation:
     # ------------------------------------------------------------------ the time step
 
     def _check_time_step(self) -> None:
-        """Compute the limit again; halve a time step that exceeds it."""
+        """Compute the stability limit again, and halve the time step while it exceeds the limit.
+
+        Raises SceneError if the step is still not stable when it may not be halved any more.
+        """
         limit = self.limit
         limit.update(self.scene, self.blocks, self.contacts, self.joints, self.dt)
         if self.dt > MAX_FRACTION_OF_LIMIT * limit.current:

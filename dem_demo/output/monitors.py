@@ -146,7 +146,11 @@ def slip_distance(law: jl.Law) -> float:
 
 
 def friction_angle(law: jl.Law, stress: float) -> float:
-    """Peak friction angle (degrees) of a law in direct shear at a constant normal stress (Pa)."""
+    """Peak friction angle (degrees) of a law in direct shear at a constant normal stress (Pa).
+
+    For Coulomb's law from friction and cohesion; for other laws by a simulated test up to a
+    multiple of the slip distance of the law.
+    """
     if type(law) is jl.CoulombLaw:  # a subclass may have more elements
         return float(np.degrees(np.arctan(law.friction + law.cohesion / stress)))
     slip = PEAK_SEARCH * slip_distance(law)

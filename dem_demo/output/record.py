@@ -125,7 +125,10 @@ def format_blocks(blocks: list[dict]) -> str:
 
 
 def _read_joints(sim: Simulation) -> dict[str, np.ndarray]:
-    """Return the columns of `RunRecord.joints` for joints that touch or almost touch."""
+    """Columns of `RunRecord.joints` for the present contacts with a length above zero.
+
+    Each contact has the two ends of the part of the joint that it bears (n, 2, 2), in m.
+    """
     contacts = sim.contacts
     joints = sim.joints
     # A contact carries a part of the joint on each side of its corner; a length that neither side
@@ -236,7 +239,11 @@ def _creep_rates(record: RunRecord) -> np.ndarray:
 
 
 def _groups(scene: Scene) -> dict[str, list[int]]:
-    """Numbers of the free blocks of each rock, and of all other free blocks, by name."""
+    """Numbers of free blocks by the name of their group.
+
+    A group for each rock, and one for all other blocks that are neither fixed nor driven: "other
+    blocks" beside rocks, "blocks" without any.
+    """
     groups = {rock.name: rock.free for rock in scene.rocks}
     free = {i for i, block in enumerate(scene.blocks) if not (block.fixed or block.prescribed)}
     remaining = sorted(free.difference(*groups.values()))
@@ -250,7 +257,11 @@ def _displaces_blocks(scene: Scene) -> bool:
 
 
 def _state(failed_blocks: int, creep: float, is_test: bool) -> str:
-    """The `state` of an outcome."""
+    """State of a group of blocks at the end of a run, from failed blocks and creep rate (m/s).
+
+    "failed" with any failed block (not in a laboratory test), "displacing" for a creep rate of
+    CREEP_RATE and more, else "at rest" in a laboratory test and "stable" otherwise.
+    """
     if failed_blocks and not is_test:
         return "failed"
     if creep >= CREEP_RATE:

@@ -60,7 +60,11 @@ class JointSet:
         return np.array([np.sin(dip), np.cos(dip)])
 
     def offsets(self, corners: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return distances n . x (m) of the joints that may cross a body with these corners."""
+        """Distances n . x (m), ascending, of the joints that may cross a body with these corners.
+
+        From the joint through `through` on, spacings are random by up to `scatter` on both sides;
+        only joints strictly between the extreme corners are returned.
+        """
         low, high = np.quantile(corners @ self.normal, [0.0, 1.0])
         start = float(np.dot(self.normal, self.through))
         sides = []
@@ -172,7 +176,11 @@ def _split(piece: Polygon, normal: np.ndarray, offset: float) -> list[Polygon]:
 
 
 def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
-    """Cut a piece through its inward corners; the cuts are appended to `lines`."""
+    """Cut a piece through its inward corners, recursively, until its parts are convex.
+
+    Each cut follows a joint set and is appended to `lines`. A piece narrower than `tiny` gives no
+    part. Raises ValueError if no set runs through an inward corner.
+    """
     if _width(piece) < tiny:
         return []
     corners = _corners(piece, tiny)

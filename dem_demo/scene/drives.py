@@ -87,7 +87,10 @@ class Drive:
 
 @cache
 def _reversed_drive(drive: Drive, time: float) -> Drive:
-    """Return a drive that follows another one until a time (s) and its reversal from there on."""
+    """A drive that follows another one until a time (s), and then its reversal.
+
+    From its value at that time, it changes by `reverse["by"]` within `reverse["duration"]`.
+    """
     count = int(np.searchsorted(drive.times, time))
     present = float(np.interp(time, drive.times, drive.values))
     return replace(
@@ -113,7 +116,12 @@ class Drives:
         self.aim = np.zeros(len(motions))
 
     def velocity(self, t: float, dt: float) -> np.ndarray:
-        """Return the velocities (m,) that carry the driven blocks exactly from t to t + dt (s)."""
+        """Velocities (m,) of the driven motions that carry blocks exactly from time t to t + dt
+        (s).
+
+        Each is the change of the prescribed path over the step divided by dt, one for each driven
+        motion of a block; a drive with a single point in time holds its block at rest.
+        """
         drives = zip(self.drives, self.reversed_at.tolist(), strict=True)
         paths = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in drives]
         return np.array(paths, float)[self.which] / dt

@@ -167,7 +167,11 @@ def _require_larger(path: str | Path, name: str, values: Array, bound: float, wh
 
 
 def closure_along(law: JointLaw, stress: Array) -> Array:
-    """Closures (n,) in m of a new joint that is brought to these normal stresses (Pa) in turn."""
+    """Closures (n,) in m of a new joint that is loaded to these normal stresses (Pa) in turn.
+
+    The joint has neither shear nor dilation and keeps its history from one stress to the next, so
+    that unloading differs from loading.
+    """
     batch = replace(law, plane=None, closure_only=True).joints(1)
     scale = float(np.max(stress))
     closures = np.empty(stress.size)
@@ -243,7 +247,10 @@ FORMS = {
 
 
 def fit_form(form: StressForm, stress: Array, hydraulic: Array) -> Array:
-    """Parameters (2,) of a form by least squares of ln(e) at stresses (Pa) and apertures (m)."""
+    """Parameters (2,) of a form by least squares of ln(e) at stresses (Pa) and apertures (m).
+
+    The logarithms of both parameters vary, from the guess of the form, so that they stay positive.
+    """
     guess = np.abs(np.asarray(form.guess(stress, hydraulic), float))
 
     def residuals(x: Array) -> Array:
@@ -277,7 +284,11 @@ class FlowFit:
 
     @cached_property
     def errors(self) -> dict[str, FormErrors]:
-        """Errors of each form."""
+        """Errors of each form by its name.
+
+        Its relative error at the largest stress, and the rms of its relative errors on the
+        unloading branch, NaN without one.
+        """
         top = int(np.argmax(self.test.stress))
         unloading = ~self.test.is_loading
         errors = {}

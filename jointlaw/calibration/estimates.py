@@ -113,9 +113,10 @@ class Estimates:
 
     @cached_property
     def parameters_to_fix(self) -> tuple[str, ...]:
-        """Free parameters to fix, least constrained first, so that the data determine the others.
+        """Free parameters to fix so that the data determine the others, least constrained first.
 
-        Without any opening friction is the first.
+        Friction comes first if it trades off with slopes without any measured opening. The preload
+        closure is never named. Empty where the data determine all free parameters.
         """
         to_fix = ["mu"] if self.has_trade_off else []
         not_fixed = {"preload_closure", *to_fix}
@@ -155,7 +156,10 @@ class Estimates:
 
     @property
     def _softening_points(self) -> int:
-        """Largest number of points of a test at which the bond softens in pure shear."""
+        """Largest number of measured points of a test at which the bond would soften in pure shear.
+
+        These are the points whose displacement lies between the onset of damage and failure.
+        """
         assert self.law.bond is not None
         (_, begin), (_, end) = self.law.bond.limits
         slips = (np.abs(curve.shear) for curve in self.problem.shears)
@@ -202,7 +206,10 @@ class Estimates:
 
     @property
     def shape_differs(self) -> tuple[bool, ...]:
-        """Whether each series has another shape than the curve of the law."""
+        """Whether each series has another shape than the curve of the law.
+
+        True where the autocorrelated part of its misfit exceeds a multiple of its noise level.
+        """
         pairs = zip(self.autocorrelated_misfit, self._curve_series, strict=True)
         return tuple(
             misfit > MAX_AUTOCORRELATED_MISFIT * float(series.sigma().min())

@@ -152,13 +152,17 @@ class PeakTest(NamedTuple):
 
 
 def shear_past_peak(law: JointLaw, normal_stress: float, displacement: float) -> PeakTest:
-    """Shear a new joint of a law to four times an expected peak displacement.
+    """Shear a new joint of a law at constant normal stress, to four times an expected peak
+    displacement.
 
     Parameters
     ----------
     law: the law.
     normal_stress: constant normal stress in Pa.
     displacement: expected shear displacement at the peak in m.
+
+    Returns the `PeakTest`: the record of the test, the shear displacement (m) at its peak, and the
+    normal stiffness (Pa/m) of a joint closed, but not sheared, to this stress.
     """
     _, C = law.joint().update([law.closure(normal_stress), 0.0, 0.0])
     assert C is not None

@@ -113,7 +113,10 @@ class ClosureCurve:
         object.__setattr__(self, name, value)
 
     def _without_slack(self, stress: Array, closure: Array) -> tuple[Array, Array]:
-        """The rows from first contact on; slack rows before it are noted."""
+        """Stress and closure from the first loaded row on, without the slack rows before it.
+
+        A note on them is added to `notes`. One row before the first loaded row is no slack.
+        """
         slack = int(np.argmax(stress > MAX_SLACK_STRESS * stress.max()))
         if slack <= 1:
             return stress, closure
@@ -258,7 +261,10 @@ class ShearCurve:
 
     @cached_property
     def reversals(self) -> list[int]:
-        """Rows of the first point, of the shear reversals, and of the last point."""
+        """Rows of the first point, of each shear reversal, and of the last point, ascending.
+
+        Displacements that return by less than a small share of the largest one are no reversal.
+        """
         is_sheared = np.abs(self.shear) > MIN_SHEAR_REVERSAL * np.max(np.abs(self.shear))
         first_sense = np.sign(self.shear[int(np.argmax(is_sheared))])
         rows = reversal_rows(first_sense * self.shear, 0.0, MIN_SHEAR_REVERSAL)
@@ -266,7 +272,13 @@ class ShearCurve:
 
     @cached_property
     def peak(self) -> "Peak | None":
-        """The peak of the shear stress; None if the stress does not fall by 4 % after it."""
+        """The peak of the shear stress, within one stroke from reversal to reversal.
+
+        None if the stress falls by less than 4 % of the peak within the rest of this stroke. `Peak`
+        holds the row of the peak, first and last row of the stroke, the displacement (m) from the
+        start of the stroke, and its relative error: the usual error of a peak displacement,
+        combined with half the width of the top of the curve.
+        """
         stress = np.abs(self.shear_stress)
         row = int(np.argmax(stress))
         ends = [end for end in self.reversals[1:] if end >= row]
@@ -433,7 +445,9 @@ class Peak(NamedTuple):
 
 
 def _interpolated_maximum(x: Array, y: Array) -> tuple[float, float]:
-    """Position and value of the maximum of points (n,), by a parabola through the three highest."""
+    """Position and value of the maximum of points (n,), by a parabola through the highest and its
+    two neighbours. The highest point itself at an end, or where x does not increase there.
+    """
     top = int(np.argmax(y))
     if top == 0 or top == y.size - 1:
         return float(x[top]), float(y[top])

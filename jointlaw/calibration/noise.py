@@ -343,7 +343,7 @@ def _working_terms(test: LinearTest, hyperparameters: Hyperparameters) -> tuple[
 
 
 def _correlate(rows: Array, rho: float) -> Array:
-    """R times rows (n, ...), R being the correlation matrix rho^|i - j|."""
+    """The product R rows, where R_ij = rho^|i - j| is the correlation matrix of rows (n, ...)."""
     index = np.arange(rows.shape[0])
     R = rho ** np.abs(np.subtract.outer(index, index)) if rho else np.eye(index.size)
     return np.asarray(R @ rows)
@@ -524,7 +524,10 @@ def _level_axis(source: str, level: float, log_error: float, deviates: Array) ->
 
 
 def _probable(values: Array, probabilities: Array, all_values: Array) -> Array:
-    """The values with a considerable probability, and the neighbours of these in `all_values`."""
+    """Values to keep on a grid: the probable ones, and their neighbours in `all_values`.
+
+    values: the present grid, a part of `all_values`, with its probabilities.
+    """
     is_probable = np.isin(all_values, values[probabilities > _MIN_PROBABILITY])
     neighbours = is_probable.copy()
     neighbours[1:] |= is_probable[:-1]

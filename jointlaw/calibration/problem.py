@@ -147,7 +147,11 @@ class Problem:
         return np.clip(transformed, *self.bounds())
 
     def pack_scaled(self, values: Values) -> Array:
-        """The vector of these values, with a stiffness that fits the closure curve on average."""
+        """The vector of these values, with a stiffness that fits the closure curve on average.
+
+        The stiffness is `asperity_density`, else K, whichever is free; without either, or without a
+        closure curve, as `pack`.
+        """
         x = self.pack(values)
         stiffness = next((name for name in ("asperity_density", "K") if name in self.free), None)
         curve = self.closure
@@ -299,9 +303,11 @@ def _finite_initial_value(
 
 
 def starting_points(problem: Problem, has_law: bool) -> list[Array]:
-    """Vectors to start from: the initial values, and for closure narrow to broad heights.
+    """Vectors to start a fit from.
 
-    has_law: whether the initial values come from a law instead of the defaults.
+    One, the initial values, without a closure curve, with heights that are fixed, or with shear
+    tests and a law. Else several, with narrow to broad heights that suit the closure curve. Each
+    has the stiffness that fits the closure curve on average.
     """
     free = set(problem.free)
     values = problem.values
@@ -476,7 +482,11 @@ def _step_within(x: Array, posterior: Posterior, low: Array, high: Array) -> Arr
 def _decreasing_step(
     problem: Problem, x: Array, step: Array, tests: Sequence[LinearTest], posterior: Posterior
 ) -> Array:
-    """The step, halved until it does not increase the misfit of the most probable noise model."""
+    """The step, halved until it increases the misfit by at most one unit; zero if none does.
+
+    The misfit is that of the most probable noise model. Steps to parameters whose joints cannot
+    follow a test are halved too.
+    """
 
     def objective(at: Array, residuals_at: Sequence[LinearTest]) -> float:
         prior = problem.prior(at)

@@ -146,7 +146,14 @@ class FileTable(NamedTuple):
         return column._replace(values=column.values * factor)
 
     def find_columns(self, quantity: Quantity, override: str | None = None) -> list[Column]:
-        """The columns with the name in `override`, or with the first alias that any column has."""
+        """All columns that hold a quantity, in the order of the file; several if the file has
+        several.
+
+        override: name, and perhaps unit, from the command line, "Disp:mm": only columns with this
+        name. Without it the aliases of the quantity are tried in turn, and the columns of the first
+        alias that any column has are returned. Ambiguous aliases are tried last, and only if no
+        more than one column has a unit of this quantity. Empty if no column matches.
+        """
         aliases: tuple[str, ...]
         if override is not None:
             aliases = (_normalised(override.partition(":")[0]),)
@@ -328,7 +335,11 @@ class _Block(NamedTuple):
 
 
 def _split_stacked(rows: Rows, number_format: NumberFormat) -> list[_Block]:
-    """Split the rows of a sheet into tables below one another, each with its line of names."""
+    """Split the rows of a sheet into tables below one another, each with its line of names.
+
+    A table begins at its line of names: two words or more and no number, before any row of numbers;
+    or the same line again below a table. A line of units may follow it. Text above is left out.
+    """
     blocks: list[_Block] = []
     for line, row in rows.items():
         has_numbers = any(
@@ -350,7 +361,11 @@ def _split_stacked(rows: Rows, number_format: NumberFormat) -> list[_Block]:
 
 
 def _split_side_by_side(block: _Block) -> list[_Block]:
-    """Split a table into tests beside one another, each with the same names."""
+    """Split a table into tests beside one another, if its names repeat.
+
+    They repeat where the first name occurs again and all parts have the same two names or more;
+    else the block itself is returned.
+    """
     names = [_normalised(title) for title in block.titles]
     starts = [k for k, name in enumerate(names) if name and name == names[0]]
     parts = [slice(a, b) for a, b in zip(starts, [*starts[1:], len(names)], strict=True)]

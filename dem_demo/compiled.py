@@ -33,6 +33,10 @@ FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "finish_step": ([DOUBLE], None),
     "compute_unbalanced": ([], ctypes.c_int),
     "relax": ([INTEGER], ctypes.c_int),
+    "place_solids": ([], None),
+    "near_pairs": ([POINTER] * 2 + [INTEGER, POINTER], INTEGER),
+    "separations": ([INTEGER, POINTER, DOUBLE, POINTER], None),
+    "face_contacts": ([INTEGER, *[POINTER] * 4, DOUBLE, POINTER], INTEGER),
 }
 
 
@@ -76,6 +80,18 @@ class RelaxationArrays(Arrays):
     """`dem_relaxation` of layout.h: numbers of a relaxation, and addresses of its arrays."""
 
     _fields_ = [(name, field.ctype) for name, field in layout.RELAXATION.items()]
+
+
+class SolidArrays(Arrays):
+    """`dem_solids` of layout.h: polyhedra in space, and addresses of their arrays."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.SOLIDS.items()]
+
+
+class PointArrays(Arrays):
+    """`dem_points` of layout.h: contact points of polyhedra."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.POINTS.items()]
 
 
 def address(array: Any) -> int:

@@ -176,11 +176,35 @@ RELAXATION = {
     "done": Field("long long", "iterations"),
     "ramp": Field("long long", "iterations over which the loads come on"),
 }
+SOLIDS = {
+    "n_blocks": Field("long long", "n"),
+    "first_vertex": Field("const long long *", "(n + 1,): of each block"),
+    "first_face": Field("const long long *", "(n + 1,): of each block"),
+    "first_corner": Field("const long long *", "(faces + 1,): of each face, in `corner`"),
+    "corner": Field("const long long *", "vertices of the faces, counter-clockwise from outside"),
+    "local_vertex": Field("const double *", "(vertices, 3): from the centroid, along its axes"),
+    "local_normal": Field("const double *", "(faces, 3): outward, along the axes of the block"),
+    "position": Field("const double *", "(n, 3): centroids, m"),
+    "rotation": Field("const double *", "(n, 3, 3): the axes of a block are the columns"),
+    "is_mobile": Field("const unsigned char *", "(n,): 1 for a block that moves"),
+    "vertex": Field("double *", "(vertices, 3): now, m"),
+    "normal": Field("double *", "(faces, 3): now"),
+    "box": Field("double *", "(n, 2, 3): lowest and highest coordinates, m"),
+}
+POINTS = {
+    "capacity": Field("long long", "points that the arrays have room for"),
+    "face_a": Field("long long *", "(capacity,): face of the block with the lower number"),
+    "face_b": Field("long long *", "(capacity,): face of the other block"),
+    "point": Field("double *", "(capacity, 3): on face a, m"),
+    "area": Field("double *", "(capacity,): m2"),
+}
 STRUCTURES = {
     "dem_law_joints": LAW_JOINTS,
     "dem_step": STEP,
     "dem_relaxed_law": RELAXED_LAW,
     "dem_relaxation": RELAXATION,
+    "dem_solids": SOLIDS,
+    "dem_points": POINTS,
 }
 
 

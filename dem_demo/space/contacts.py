@@ -1,0 +1,227 @@
+"""Contacts of blocks in space: points of faces that lie on each other.
+
+Two faces that look at each other are in contact over their overlap, a convex polygon. Its corners
+are the contact points, and each carries the area of its share of the polygon, so force and moment
+of a closure that varies linearly over the overlap are exact. As in the plane, the stiffness against
+rocking of a rectangular contact is three times that of a bed of springs; the limit of toppling, at
+which the resultant reaches the edge, is exact.
+
+A point lies on the face of block a, the block with the lower number, and its closure is its depth
+below the plane of the face of block b. The directions of the law are fixed to block b: the normal
+of its face, axis 2 (the rough direction of the joint) and axis 3, so the history of a joint rotates
+with the rock. The roles never change; they follow from the numbers of the blocks alone.
+
+The geometry is computed by `native/face_contacts.c`, which knows no Python and no law, so another
+code can carry it. Faces that are tilted by more than 2 degrees against each other are no contact.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled import PointArrays, SolidArrays, address
+from .solids import Solid
+
+MAX_TILT = np.radians(2.0)  # of two faces in contact
+TIE_PER_WIDTH = 1e-5  # of the narrower block: distances below it count as zero
+POINTS_PER_PAIR = 8  # room for points at first
+MAX_FACE_CORNERS = 128  # of two faces, as in face_contacts.c
+
+
+class Surfaces:
+    """Vertices and faces of all blocks, and where they are.
+
+    Arrays run over n blocks, v vertices and f faces of all of them. position (n, 3) in m: of the
+    centroids; rotation (n, 3, 3): its columns are the principal axes of a block. volume (n,) in m3;
+    moments (n, 3): principal moments of inertia at a density of 1 kg/m3. radius, width (n,) in m:
+    distance of the farthest vertex from the centroid; smallest width. is_mobile (n,).
+    first_vertex, first_face (n + 1,), first_corner (f + 1,), corner: numbers of the vertices of
+    face i are corner[first_corner[i] : first_corner[i + 1]]. vertex (v, 3), normal (f, 3),
+    box (n, 2, 3): at the present places, written by `place`.
+    """
+
+    def __init__(self, solids: Sequence[Solid], is_mobile: np.ndarray) -> None:
+        n = len(solids)
+        self.solids = tuple(solids)
+        self.is_mobile = np.array(is_mobile, np.uint8)
+        self.position = np.array([solid.centroid for solid in solids]).reshape(n, 3)
+        self.volume = np.array([solid.volume for solid in solids])
+        self.width = np.array([solid.width for solid in solids])
+        self.moments, axes = np.linalg.eigh(np.array([solid.inertia for solid in solids]))
+        axes[:, :, 2] *= np.sign(np.linalg.det(axes))[:, None]
+        self.rotation = np.ascontiguousarray(axes)
+        self.first_vertex = _starts(len(solid.vertices) for solid in solids)
+        self.first_face = _starts(len(solid.faces) for solid in solids)
+        faces = [
+            [start + vertex for vertex in face]
+            for solid, start in zip(solids, self.first_vertex.tolist(), strict=False)
+            for face in solid.faces
+        ]
+        self.first_corner = _starts(map(len, faces))
+        self.corner = np.array([vertex for face in faces for vertex in face], np.int64)
+        self.block_of_face = np.repeat(np.arange(n), np.diff(self.first_face))
+        self.face_sets = np.concatenate([solid.face_sets for solid in solids]).astype(int)
+        relative = [solid.vertices - solid.centroid for solid in solids]
+        self.radius = np.array([np.linalg.norm(arms, axis=1).max() for arms in relative])
+        local = zip(relative, axes, strict=True)
+        self.local_vertex = np.concatenate([arms @ axis for arms, axis in local])
+        normals = zip((solid.face_normals for solid in solids), axes, strict=True)
+        self.local_normal = np.concatenate([normal @ axis for normal, axis in normals])
+        self.vertex = np.empty_like(self.local_vertex)
+        self.normal = np.empty_like(self.local_normal)
+        self.box = np.empty((n, 2, 3))
+        self.arrays = SolidArrays(n_blocks=n)
+        self.arrays.bind(
+            self, "first_vertex", "first_face", "first_corner", "corner", "local_vertex",
+            "local_normal", "position", "rotation", "is_mobile", "vertex", "normal", "box",
+        )  # fmt: skip
+        self.place()
+
+    def place(self) -> None:
+        """Compute vertices, normals and boxes at the present positions and rotations."""
+        self.arrays.call("place_solids")
+
+    def ring(self, face: int) -> np.ndarray:
+        """Vertices (m, 3) of a face now, in m."""
+        return self.vertex[self.corner[self.first_corner[face] : self.first_corner[face + 1]]]
+
+    def near_pairs(self, reach: np.ndarray) -> np.ndarray:
+        """Pairs (p, 2) of blocks, the lower number first, whose boxes are nearer than the sum of
+        their reaches (n,) in m, and of which one can move."""
+        order = np.argsort(self.box[:, 0, 0] - reach, kind="stable")
+        room = 16 * len(reach)
+        while True:
+            pairs = np.empty((room, 2), np.int64)
+            places = address(order), address(reach)
+            count = self.arrays.call("near_pairs", *places, room, address(pairs))
+            if count <= room:
+                pairs = pairs[:count]
+                return np.ascontiguousarray(pairs[np.lexsort(pairs.T[::-1])])
+            room = count
+
+    def separations(self, pairs: np.ndarray, tolerance: float) -> np.ndarray:
+        """Separations (p,) in m of pairs (p, 2) of blocks: below -`tolerance` (m) where they
+        overlap, and then minus the depth of the overlap."""
+        separation = np.empty(len(pairs))
+        self.arrays.call("separations", len(pairs), address(pairs), tolerance, address(separation))
+        return separation
+
+
+def _starts(counts) -> np.ndarray:
+    """Number of the first member of each group, and of all members."""
+    return np.concatenate([[0], np.cumsum([*counts])]).astype(np.int64)
+
+
+class ContactPoints(NamedTuple):
+    """k contact points; all points of a contact of two faces follow each other.
+
+    block_a, block_b, face_a, face_b (k,): numbers of blocks and faces, block_a < block_b. point
+    (k, 3): on face a, m. area (k,) in m2. contact (k,): number of the contact of two faces.
+    """
+
+    block_a: np.ndarray
+    block_b: np.ndarray
+    face_a: np.ndarray
+    face_b: np.ndarray
+    point: np.ndarray
+    area: np.ndarray
+    contact: np.ndarray
+
+
+def find_contacts(surfaces: Surfaces, reach: np.ndarray, max_overlap: float) -> ContactPoints:
+    """Find all contacts of faces at the present places of the blocks.
+
+    reach (n,) in m: two faces are in contact where their gap is below the sum of the reaches.
+    max_overlap: largest depth of a contact, as a fraction of the width of the narrower block.
+
+    Raises ValueError for faces of too many corners.
+    """
+    pairs = surfaces.near_pairs(reach)
+    width = surfaces.width[pairs].min(axis=1)
+    max_gap = reach[pairs].sum(axis=1)
+    max_depth = max_overlap * width
+    tie = TIE_PER_WIDTH * width
+    room = POINTS_PER_PAIR * len(pairs)
+    while True:
+        face_a, face_b = np.empty((2, room), np.int64)
+        point = np.empty((room, 3))
+        area = np.empty(room)
+        out = PointArrays(capacity=room)
+        out.bind(face_a=face_a, face_b=face_b, point=point, area=area)
+        places = map(address, (pairs, max_gap, max_depth, tie))
+        count = surfaces.arrays.call(
+            "face_contacts", len(pairs), *places, -np.cos(MAX_TILT), address(out)
+        )
+        if count < 0:
+            raise ValueError(f"two faces in contact have more than {MAX_FACE_CORNERS} corners")
+        if count <= room:
+            break
+        room = count
+    face_a, face_b = face_a[:count], face_b[:count]
+    starts = np.append(True, np.diff(face_a).astype(bool) | np.diff(face_b).astype(bool))[:count]
+    return ContactPoints(
+        surfaces.block_of_face[face_a], surfaces.block_of_face[face_b], face_a, face_b,
+        point[:count].copy(), area[:count].copy(), np.cumsum(starts) - 1,
+    )  # fmt: skip
+
+
+def dip_line(normal: np.ndarray) -> np.ndarray:
+    """Unit vectors (k, 3) down the dip of planes with normals (k, 3); to the north (y) in a
+    horizontal plane."""
+    down = np.array([0.0, 0.0, -1.0]) + normal[:, 2:] * normal
+    steepness = np.linalg.norm(down, axis=1)
+    is_flat = steepness < np.sin(np.radians(1e-6))
+    down[is_flat] = [0.0, 1.0, 0.0]
+    down -= np.einsum("ki,ki->k", down, normal)[:, None] * normal
+    return down / np.linalg.norm(down, axis=1)[:, None]
+
+
+def turned_from_dip(normal: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """Unit vectors (k, 3) in planes with normals (k, 3) at angles (k,) from their dip lines.
+
+    Angles (degrees) are counter-clockwise seen from above, of a vertical plane seen from the side
+    to which x increases, or y if the plane is normal to y. Both sides of a plane have the same
+    vector.
+    """
+    down = dip_line(normal)
+    rounded = np.round(normal, 9)
+    x, y, z = rounded.T
+    is_up = (z > 0) | ((z == 0) & ((x > 0) | ((x == 0) & (y > 0))))
+    upward = np.where(is_up[:, None], normal, -normal)
+    angle = np.radians(degrees)[:, None]
+    return np.cos(angle) * down + np.sin(angle) * np.cross(upward, down)
+
+
+class Rows(NamedTuple):
+    """How closure and shears of k contact points follow the motions of their blocks.
+
+    closure (k,) in m. axes (k, 3, 3): normal of block b, axis 2, axis 3. kinematics (k, 3, 12): of
+    closure and both shears by the displacement of a, its rotation about its principal axes, and the
+    same of b.
+    """
+
+    closure: np.ndarray
+    axes: np.ndarray
+    kinematics: np.ndarray
+
+
+def contact_rows(surfaces: Surfaces, points: ContactPoints, axis_2: np.ndarray) -> Rows:
+    """Rows of contact points at the present places of the blocks.
+
+    axis_2 (k, 3): directions of the law's axis 2 now.
+    """
+    a, b = points.block_a, points.block_b
+    normal = surfaces.normal[points.face_b]
+    axis_2 = axis_2 - np.einsum("ki,ki->k", axis_2, normal)[:, None] * normal
+    axis_2 /= np.linalg.norm(axis_2, axis=1)[:, None]
+    axes = np.stack([normal, axis_2, np.cross(normal, axis_2)], axis=1)
+    on_face = surfaces.vertex[surfaces.corner[surfaces.first_corner[points.face_b]]]
+    closure = np.einsum("ki,ki->k", on_face - points.point, normal)
+    rates = axes * np.array([-1.0, 1.0, 1.0])[:, None]  # of closure and shears by a
+    parts = []
+    for block, sign in ((a, 1.0), (b, -1.0)):
+        arm = points.point - surfaces.position[block]
+        turning = np.cross(arm[:, None], rates) @ surfaces.rotation[block]
+        parts += [sign * rates, sign * turning]
+    return Rows(closure, axes, np.concatenate(parts, axis=2))

@@ -122,6 +122,13 @@ class LawJoints:
         self.step.measures[places] = np.column_stack([measures, np.tile(start, (len(places), 1))])
         return start
 
+    def copy(self, source: np.ndarray, target: np.ndarray) -> None:
+        """Make the joints at places `target` (m,) copies of the joints at `source` (m,)."""
+        batch = self.pool.batch
+        batch.restore(batch.snapshot(source), target)
+        self.step.F[target] = self.step.F[source]
+        self.step.measures[target] = self.step.measures[source]
+
     def restore(self, state: jl.JointState) -> np.ndarray:
         """Replace all joints of this law by the joints of a snapshot, and their readings.
 
@@ -350,6 +357,21 @@ class Joints:
                     joints.initialise(self.place[rows[mine]], mated, bonded=False)
         self.step_arrays.call("read_joints")
         return out
+
+    def continue_joints(self, rows: np.ndarray, sources: np.ndarray) -> None:
+        """Let the joints of contacts `rows` (m,) continue the joints of contacts `sources` (m,).
+
+        They become copies with the same law and history.
+        """
+        for row, source in zip(rows.tolist(), sources.tolist(), strict=True):
+            joints = self.by_law[self.law[source]]
+            if self.law[row] != self.law[source]:
+                self.by_law[self.law[row]].release(self.place[[row]])
+                self.law[row] = self.law[source]
+                self.place[row] = joints.allocate(1)[0]
+            joints.copy(self.place[[source]], self.place[[row]])
+            self.first_touch[row] = self.first_touch[source]
+        self._arrange(self.law, self.place)
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """A copy of all state, by names of arrays. Laws are numbered in them."""

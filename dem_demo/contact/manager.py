@@ -24,6 +24,12 @@ contact that opens and closes keeps its joint.
 
 A rebuild raises an error rather than to miss a contact: where two blocks overlap and no corner in
 its range sees half of the overlap.
+
+Seams. A block may slide from one block onto its coplanar neighbour, or from under one roof block to
+the next. The contact that will bear on the neighbour is found between the two end faces, which face
+each other across the seam, and its corner then goes on to the coplanar face. With a new joint rough
+faces would drop there by their whole dilation, although the surface does not end at a seam. Such a
+contact continues the joint of its neighbour instead (`find_neighbours`).
 """
 
 import numpy as np
@@ -41,6 +47,8 @@ MAX_SKIN_UNTIL_REBUILD = 0.25  # fraction of its skin that a block may move unti
 MOVED_FRACTION = 0.001  # of its skin: blocks that moved less are left out of a rebuild
 DROP_GAP = 1.5  # skins: gap beyond which a contact is dropped
 CAPACITY = 64  # candidates that there is room for at first
+MAX_SEAM_SINE = np.sin(np.radians(2.0))  # of the angle between coplanar edges, as in the C file
+MAX_SEAM_STEP = 0.05  # of the skin: step between coplanar edges at a seam
 
 
 def _in_range(contacts: Contacts, is_known: np.ndarray) -> np.ndarray:
@@ -172,6 +180,54 @@ class ContactManager:
         self.rebuilt_at[:, has_moved] = motion[:3, has_moved]
         self.needs_rebuild[:] = False
         return has_moved
+
+    def find_neighbours(self, rows: np.ndarray, bears_load: np.ndarray) -> np.ndarray:
+        """Contacts (m,) whose joints the contacts `rows` (m,) continue across a seam; -1 for none.
+
+        A contact and its neighbour share one edge. Their other edges belong to two blocks and are
+        coplanar. The neighbour bears a load, as the mask `bears_load` (k,) tells, is as deep as the
+        contact within `MAX_SEAM_STEP`, and has the law that the edges of the contact need. Of
+        several neighbours the nearest one is taken.
+        """
+        contacts = self.contacts
+        edge_pairs = contacts.edge_pairs
+        loaded = np.flatnonzero(bears_load)
+        law = self.laws_of(edge_pairs[rows])
+        neighbours = np.full(len(rows), -1)
+        for i, row in enumerate(rows):
+            max_step = MAX_SEAM_STEP * self._skin(contacts.block_a[row], contacts.block_b[row])
+            is_as_deep = np.abs(contacts.closure[loaded] - contacts.closure[row]) <= max_step
+            candidates = loaded[is_as_deep & (self.law[loaded] == law[i])]
+            is_neighbour = np.zeros(len(candidates), bool)
+            for shared, other in (edge_pairs[row], edge_pairs[row, ::-1]):
+                has_shared = (edge_pairs[candidates] == shared).any(axis=1)
+                across_seam = edge_pairs[candidates].sum(axis=1) - shared
+                across_seam = np.where(has_shared, across_seam, other)
+                is_neighbour |= has_shared & self._are_coplanar(across_seam, other)
+            candidates = candidates[is_neighbour]
+            if len(candidates):
+                distance = np.abs(contacts.position[candidates] - contacts.position[row])
+                neighbours[i] = candidates[distance.argmin()]
+        return neighbours
+
+    def _are_coplanar(self, edges: np.ndarray, other: int) -> np.ndarray:
+        """Whether edges (m,) of other blocks continue the edge `other` across a seam.
+
+        They are parallel within 2 degrees. At the seam they end within a skin of each other, and
+        within `MAX_SEAM_STEP` of a skin across their direction.
+        """
+        outlines = self.outlines
+        start = outlines.corner_position
+        end = start[outlines.next]
+        direction = outlines.edge_direction[other]
+        skin = self.skins[outlines.block[other]]
+        angle = outlines.edge_direction[edges] * direction.conj()
+        to_next = (start[edges] - end[other]) * direction.conj()
+        to_previous = (end[edges] - start[other]) * direction.conj()
+        seam = np.where(np.abs(to_next) < np.abs(to_previous), to_next, to_previous)
+        is_parallel = (angle.real > 0) & (np.abs(angle.imag) <= MAX_SEAM_SINE)
+        is_near = (np.abs(seam) <= skin) & (np.abs(seam.imag) <= MAX_SEAM_STEP * skin)
+        return is_parallel & is_near & (outlines.block[edges] != outlines.block[other])
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""

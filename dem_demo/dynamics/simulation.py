@@ -357,14 +357,19 @@ class Simulation:
 
     def _update_contact_list(self) -> None:
         """Bring joints, energies and limit up to date with transferred and new contacts."""
+        is_new = np.zeros(self.joints.n, bool)
         if self.arrays.transferred:
             self._transfer_joints()
         if self.arrays.rebuild:
-            self._rebuild_contacts()
+            is_new = self._rebuild_contacts()
+        self._continue_across_seams(is_new)
         self.arrays.call("set_increments", self.dt)
 
-    def _rebuild_contacts(self) -> None:
-        """Rebuild the list of contacts; drop the energy of the joints that end."""
+    def _rebuild_contacts(self) -> np.ndarray:
+        """Rebuild the list of contacts; drop the energy of the joints that end.
+
+        Returns the mask (k,) of the contacts that are new.
+        """
         blocks = self.blocks
         manager = self.manager
         joints = self.joints
@@ -384,6 +389,34 @@ class Simulation:
         self.bind()
         change = apply_loads(self.scene, blocks, manager)
         balance.change_loads(blocks, change, self.dt)
+        return old_row < 0
+
+    def _continue_across_seams(self, is_new: np.ndarray) -> None:
+        """Let contacts that have reached a coplanar block continue the joints of their neighbours.
+
+        These contacts bear nothing yet. They are new (is_new (k,)), or have gone on to other edges
+        than the ones between which the manager found them.
+        """
+        manager = self.manager
+        joints = self.joints
+        edge_pairs = self.contacts.edge_pairs
+        has_other_edges = (edge_pairs != manager.edge_pairs).any(axis=1)
+        stored_energy = joints.stored_energy
+        is_idle = (stored_energy == 0) & (joints.traction == 0).all(axis=1)
+        rows = np.flatnonzero(is_idle & (is_new | has_other_edges))
+        sources = manager.find_neighbours(rows, stored_energy > 0)
+        rows, sources = rows[sources >= 0], sources[sources >= 0]
+        if not len(rows):
+            return
+        manager.edge_pairs[rows] = edge_pairs[rows]
+        manager.law[rows] = manager.law[sources]
+        manager.closure_offset[rows] = manager.closure_offset[sources]
+        joints.continue_joints(rows, sources)
+        balance = self.energy_balance
+        balance.booked_dissipation[rows] = balance.booked_dissipation[sources]
+        self.bind()
+        change = apply_loads(self.scene, self.blocks, manager)  # laws have water pressures
+        balance.change_loads(self.blocks, change, self.dt)
 
     def _transfer_joints(self) -> None:
         """Update joints and energies of contacts whose corners went on to other edges.

@@ -1,0 +1,193 @@
+"""Blocks that slide over the seam between two coplanar blocks: as on one base.
+
+The contact with the second base block continues the joint with the first one. Where the second
+block is displaced, separated by more than a skin, or has joints of another law, it does not.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from running import until
+from scene_text import ROCK, block, coulomb, dipping, lines
+
+from dem_demo import Simulation, parse
+
+COULOMB = coulomb(0.5, 1e9, 5e8)
+DEGRADING = ROCK + "slope_wear = 50.0\nslope_residual = 0.2\n"
+LAWS = pytest.mark.parametrize("law", [COULOMB, ROCK], ids=["coulomb", "rock"])
+SLIDE = 0.4  # m/s
+SKIN = 6e-3  # m
+END_OF_SLAB = 1  # number of the slab's edge that faces across the seam
+END_OF_SECOND = 3
+
+
+def sliding_slab(
+    law, split, roof=False, width=1.0, height=0.3, dip=0.0, gap=0.0, step=0.0, slant=0.0, end=1.2,
+    prescribed=True,
+):  # fmt: skip
+    """A slab whose front is 2 cm before x = 0, where the base is split into two blocks.
+
+    gap, step (m): of the second base block from the first one, along and across the face. slant
+    (m): of the seam over its depth of 1 m. roof: whether a fixed block lies on the slab, and all
+    joints are closed by 0.1 MPa. prescribed: whether a drive moves the slab, else gravity.
+    """
+    text = lines(gravity=dipping(dip)) + f"[laws.rock]\n{law}[laws.other]\n{coulomb(0.2, 2e9, 1e9)}"
+    right = [[3.0, -1.0 + step], [3.0, step]]
+    if split:
+        first = [[-2.0, -1.0], [slant, -1.0], [0.0, 0.0], [-2.0, 0.0]]
+        second = [[gap + slant, -1.0 + step], *right, [gap, step]]
+        text += block("first", corners=first, fixed=True)
+        text += block("second", corners=second, fixed=True)
+    else:
+        text += block("first", corners=[[-2.0, -1.0], *right, [-2.0, 0.0]], fixed=True)
+    left, front = -0.02 - width, -0.02
+    corners = [[left, 0.0], [front, 0.0], [front, height], [left, height]]
+    text += block("slab", corners=corners)
+    if roof:
+        text += block("roof", box=[6.0, 1.0], at=[0.5, 0.5 + height], fixed=True)
+        text += "[in_situ]\nstress = [1e5, 1e5, 0.0]\n"
+    if prescribed:
+        text += "[[drive]]\nblock = 'slab'\nmotion = 'x'\n"
+        text += lines(times=[0.0, end], values=[0.0, SLIDE * end])
+    return parse(text + "[run]\n" + lines(end=end, skin=SKIN))
+
+
+def normal_force(sim, name):
+    """Normal force (N) of the joints between the slab and the blocks called so."""
+    names = [block.name for block in sim.scene.blocks]
+    contacts = sim.contacts
+    force = contacts.length * sim.joints.traction[:, 0]
+    slab = names.index("slab")
+    return sum(force[sim.manager.between(slab, names.index(n))].sum() for n in name if n in names)
+
+
+def slide(scene, step):
+    """The simulation at its end; and for each step normal forces (N) below and above the slab, and
+    its position (m) and rotation."""
+    sim = Simulation(scene, step=step)
+    slab = [block.name for block in scene.blocks].index("slab")
+    history = until(
+        sim,
+        scene.run.end,
+        lambda: (
+            normal_force(sim, ("first", "second")),
+            normal_force(sim, ("roof",)),
+            *sim.blocks.motion[:3, slab],
+        ),
+    )
+    return sim, np.array(history)
+
+
+def on_both_bases(end=1.2, **keys):
+    """`slide` on one base, and over the seam, with the same time step."""
+    one_base = sliding_slab(split=False, end=end, **{**keys, "slant": 0.0})
+    step = 0.9 * Simulation(one_base).dt
+    return slide(one_base, step), slide(sliding_slab(split=True, end=end, **keys), step)
+
+
+@LAWS
+@pytest.mark.parametrize("slant", [0.0, 0.4, -0.4], ids=["square", "forward", "back"])
+def test_normal_force_between_floor_and_roof(law, slant):
+    """Without the joint of its neighbour the contact would start anew: the slab loses its dilation
+    and half of its load. With it, the forces differ by the time step, 4e-4 at the seam."""
+    (one, expected), (two, actual) = on_both_bases(law=law, roof=True, slant=slant)
+    assert expected[-1, 2] - expected[0, 2] > 0.4
+    np.testing.assert_allclose(actual[:, :2], expected[:, :2], rtol=1e-3)
+    assert actual[-1, :2] == pytest.approx(expected[-1, :2], rel=1e-5)
+    assert abs(two.energy_balance.error - one.energy_balance.error) < 1e-5
+
+
+@LAWS
+def test_free_load(law):
+    """A slab under its own weight: normal force, and its height relative to its dilation."""
+    (one, expected), (two, actual) = on_both_bases(law=law)
+    np.testing.assert_allclose(actual[:, 0], expected[:, 0], rtol=1e-3)
+    height = expected[:, 3] - 0.15
+    assert actual[:, 3] - 0.15 == pytest.approx(height, abs=5e-3 * np.abs(height).max())
+    assert abs(two.energy_balance.error - one.energy_balance.error) < 5e-5
+
+
+@pytest.mark.parametrize("law", [COULOMB, ROCK, DEGRADING], ids=["coulomb", "rock", "degrading"])
+def test_free_slab_that_tilts(law):
+    """A slab slides down 45 degrees: friction tilts it forward, by 1e-5 to 2e-4.
+
+    On two bases it tilts by up to twice as much, because each joint acts at its two ends only, half
+    of the length in the middle; beyond the seam it is as on one base.
+    """
+    keys = {"width": 0.6, "height": 0.5, "dip": 45.0, "prescribed": False, "end": 0.7}
+    (_, expected), (two, actual) = on_both_bases(law=law, **keys)
+    travel = expected[:, 2] - expected[0, 2]
+    assert travel[-1] > 0.6 + 0.02  # over the seam with its whole length
+    assert actual[:, 2] == pytest.approx(expected[:, 2], abs=1e-3 * travel[-1])
+    rotation = np.abs(expected[:, 4]).max()
+    assert rotation > 1e-5
+    assert actual[-1, 4] == pytest.approx(expected[-1, 4], abs=1e-2 * rotation)
+    height = np.abs(expected[:, 3] - 0.25).max()
+    assert actual[-1, 3] == pytest.approx(expected[-1, 3], abs=1e-3 * height)
+    beyond = len(expected) * 9 // 10  # a mean over vibrations of the slab
+    assert actual[beyond:, 0].mean() == pytest.approx(expected[beyond:, 0].mean(), rel=1e-3)
+    assert abs(two.energy_balance.error) < 1e-4
+
+
+def slip_beyond_the_seam(scene):
+    """Largest slip (m) of the joint with the second base block, 1 cm beyond the seam."""
+    sim = Simulation(scene)
+    until(sim, scene.run.end)
+    second, slab = ([b.name for b in scene.blocks].index(name) for name in ("second", "slab"))
+    joint = sim.manager.between(second, slab)
+    assert joint.any()
+    return sim, float(np.abs(sim.joints.delta[joint, 1]).max())
+
+
+# 1 cm beyond the seam; a drive begins and ends with a ramp of 0.1 s
+CROSSED = {"law": ROCK, "split": True, "end": 0.03 / SLIDE + 0.05}
+
+
+def test_the_slip_of_the_neighbour_is_continued():
+    _, slip = slip_beyond_the_seam(sliding_slab(**CROSSED))
+    assert slip == pytest.approx(0.03, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "keys", [{"step": -0.2 * SKIN}, {"gap": 1.2 * SKIN}], ids=["displaced", "separated"]
+)
+def test_the_joint_of_a_block_elsewhere_is_not_continued(keys):
+    _, slip = slip_beyond_the_seam(sliding_slab(**CROSSED, **keys))
+    assert slip < 0.015  # since the contact was found
+
+
+def with_edge_laws(law_of_edge):
+    """The scene with the laws of these edges (by block and number of the edge)."""
+    scene = sliding_slab(**CROSSED)
+    names = [block.name for block in scene.blocks]
+    edges = {(names.index(name), edge): law for (name, edge), law in law_of_edge.items()}
+    return replace(scene, edge_laws=edges)
+
+
+def test_the_joint_of_another_law_is_not_continued():
+    bottom, top = ("slab", 0), ("second", 2)
+    _, slip = slip_beyond_the_seam(with_edge_laws({bottom: "other", top: "other"}))
+    assert slip < 0.015  # since the contact was found
+
+
+def test_the_end_faces_may_have_another_law():
+    """The contact is found between the end faces, and changes to the law of the faces on which it
+    slides."""
+    ends = {("slab", END_OF_SLAB): "other", ("second", END_OF_SECOND): "other"}
+    sim, slip = slip_beyond_the_seam(with_edge_laws(ends))
+    assert slip == pytest.approx(0.03, rel=0.05)
+    assert (sim.manager.law[sim.joints.traction[:, 0] > 0] == 0).all()
+    assert (sim.joints.law == sim.manager.law).all()
+
+
+def test_a_run_resumed_before_the_seam_is_the_same_bit_by_bit():
+    sim = Simulation(sliding_slab(**CROSSED))
+    before = until(sim, 0.02 / SLIDE, sim.state)[-1]
+    resumed = Simulation(sim.scene, saved=before)
+    for one in (sim, resumed):
+        until(one, 0.03 / SLIDE + 0.05)
+    expected = sim.state()
+    actual = resumed.state()
+    assert all(np.array_equal(expected[name], actual[name]) for name in expected)
+    assert np.abs(sim.joints.delta[:, 1]).min() > 0.02  # all joints have crossed

@@ -9,6 +9,7 @@ tractions and measures from there: arrays of a law run over the places of its po
 `Joints` over the contacts.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -153,6 +154,33 @@ class LawJoints:
         return LawJointArrays(*map(address, arrays), len(stress), bears_tension)
 
 
+def stick_response(
+    d: np.ndarray,
+    stress_and_stiffness: Callable[[np.ndarray], np.ndarray],
+    tensile_stiffness: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tractions (k, dim) and tangents (k, dim, dim) of virgin joints that stick.
+
+    d (k, dim) in m: closure and shears. stress_and_stiffness: normal stress (Pa) and stiffness
+    bound (Pa/m) of first loading at closures (k,), as (2, k); the shear stiffness is this bound.
+    tensile_stiffness (k,) in Pa/m: of intact bonds; without one an open joint bears nothing.
+    """
+    size = np.maximum(np.abs(d[:, 0]), MIN_CLOSURE)
+    sign = np.sign(d[:, 0])
+    shears = d[:, 1:]
+    stress, shear_stiffness = stress_and_stiffness(size)
+    above = stress_and_stiffness(size * 1.01)
+    below = stress_and_stiffness(size * 0.99)
+    normal_stiffness, stiffening = (above - below) / (0.02 * size)
+    is_open = d[:, 0] <= 0
+    F = shear_stiffness[:, None] * d
+    F[:, 0] = np.where(is_open, tensile_stiffness * d[:, 0], stress)
+    C = shear_stiffness[:, None, None] * np.eye(d.shape[1])
+    C[:, 0, 0] = np.where(is_open, tensile_stiffness, normal_stiffness)
+    C[:, 1:, 0] = (stiffening * sign)[:, None] * shears
+    return F, C
+
+
 class Joints:
     """All joints of a scene; arrays run over the k contacts.
 
@@ -286,32 +314,9 @@ class Joints:
         return F / self.reduction, C / np.outer(self.reduction, self.reduction), stored_energy
 
     def stick_predictor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tractions (k, 2) and tangents (k, 2, 2) of virgin joints that stick, at d (k, 2) in m.
-
-        The shear stiffness is the stiffness bound of the first-loading curve at the closure.
-        """
-        size = np.maximum(np.abs(d[:, 0]), MIN_CLOSURE)
-        sign = np.sign(d[:, 0])
-        sliding = d[:, 1]
-        stress, shear_stiffness = self._stress_and_stiffness(size)
-        above = self._stress_and_stiffness(size * 1.01)
-        below = self._stress_and_stiffness(size * 0.99)
-        normal_stiffness, stiffening = (above - below) / (0.02 * size)
-        # an open joint bears nothing, except for a bond
+        """Tractions (k, 2) and tangents (k, 2, 2) of virgin joints that stick, at d (k, 2) in m."""
         pulling = self.tensile_stiffness[self.law] * (self.damage < 1)
-        is_open = d[:, 0] <= 0
-        normal = np.where(is_open, pulling * d[:, 0], stress)
-        normal_stiffness = np.where(is_open, pulling, normal_stiffness)
-        C = np.stack(
-            [
-                normal_stiffness,
-                0.0 * normal_stiffness,
-                stiffening * sign * sliding,
-                shear_stiffness,
-            ],
-            axis=1,
-        )
-        return np.stack([normal, shear_stiffness * sliding], axis=1), C.reshape(-1, 2, 2)
+        return stick_response(d, self._stress_and_stiffness, pulling)
 
     def _stress_and_stiffness(self, closure: np.ndarray) -> np.ndarray:
         """Normal stress (Pa) and stiffness bound (Pa/m) at first loading, (2, k)."""

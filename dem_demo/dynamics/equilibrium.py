@@ -4,63 +4,27 @@ A run starts from static equilibrium under gravity, loads and in-situ stress. It
 problem: joints harden as they close, slide at their friction limit, and open. Some blocks have no
 equilibrium at all, and the search must find out which.
 
-Equilibrium. The blocks relax from the displacements of joints that stick (`relaxation.py`), and
-Newton's method finishes. The contacts keep their places and normals; as the displacements are
-small, the search is repeated at the places just found until they no longer change (`settle`).
-
-Unstable blocks. Where there is no equilibrium, some blocks go on moving at a steady rate while the
-unbalanced force no longer falls. Every block that moves by more than a hundredth of the fastest one
-is unstable, without static equilibrium. Where it would be in the end has no meaning, as contacts
-keep their normals here: it is put back to within a few closures of where it began, in the direction
-in which it moved, so that it has released the forces that it exerted on the rest. There it is fixed
-and the others are solved again; blocks that only an unstable one supported show then. In the end
-the unstable blocks creep from their places as far as it takes to release those forces.
-
-A search without a decision counts as no equilibrium, and is reported (`Verdict.NOT_DECIDED`).
+Equilibrium (`search.py`). The contacts keep their places and normals in a search; as the
+displacements are small, it is repeated at the places just found until they no longer change
+(`settle`).
 
 In-situ stress. Joints start with the closure and sliding at which they bear the given stress. The
 closure is not a displacement of the blocks, which are drawn in their places under stress: the
 contact manager keeps it as a negative closure offset.
 """
 
-from functools import partial
-from typing import NamedTuple
-
 import numpy as np
-from scipy.sparse import bmat, csc_array, csr_array, diags
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spsolve
 
 from ..contact import ContactManager, Contacts, Joints
 from ..scene import Scene
 from .blocks import Blocks, apply_loads
-from .relaxation import UNSTABLE_FRACTION, Relaxation, Verdict
-from .timestep import contact_kinematics, opening_and_sliding_rates
+from .relaxation import Verdict
+from .search import EquilibriumSearch, StaticSystem
+from .timestep import contact_kinematics
 
 MAX_UNBALANCED_RATIO = 1e-3  # unbalanced force of a stable block, relative to its weight
 STANDARD_GRAVITY = 9.81  # m/s2: for weights in a scene without gravity
 MIN_FORCE_SCALE = 1e-6  # of the largest load: lower bound of the weight in a ratio
-
-# Newton's method
-SOLUTION_TOLERANCE = 1e-11  # residual of an equilibrium, relative to the load
-STEP_TOLERANCE = 1e-8  # the same of the stick predictor
-ACCEPTED_RESIDUAL = 1e3  # tolerances: where rounding ends the iteration above one
-MAX_ITERATIONS = 60
-MAX_DAMPINGS = 20  # trials of damping in one iteration
-DAMPING_INCREASE = 4.0
-DAMPING_DECREASE = 10.0
-MIN_DAMPING = 1e-3  # of the largest stiffness
-REGULARISATION = 1e-9  # of the least damping, so that free blocks give no singular matrix
-
-# Relaxation
-RELEASE_CLOSURES = 10.0  # largest closures by which an unstable block may move from its place
-RELEASE_DRAG = 0.01  # relative to the median stiffness: of unstable blocks that creep at the end
-MAX_RELEASE_STEPS = 40
-MIN_RELEASE_RATIO = 0.9  # of residuals of two steps of creep, which ends above it
-MAX_FINISHING_ITERATIONS = 12  # of Newton's method after a relaxation
-HIGH_STRESS = 2e7  # Pa: bounds the stiffness of joints where nothing touches at first
-FIXING_DRAG = 1e25  # 1/s2: holds a block in its place
-PREDICTOR_FALL = 0.1  # of its radius: fall of a free block in the stick predictor
 
 # Repeated search and in-situ stress
 MAX_ROUNDS = 40
@@ -95,272 +59,41 @@ def find_unbalanced(scene: Scene, blocks: Blocks, contacts: Contacts, joints: Jo
     return unbalanced_force_ratio(blocks, unbalanced) > MAX_UNBALANCED_RATIO
 
 
-class Solution(NamedTuple):
-    """Result of a search: displacements (m,) of the free motions, unstable blocks (n,), and the
-    verdict on all other blocks."""
+def static_system(
+    scene: Scene,
+    blocks: Blocks,
+    manager: ContactManager,
+    joints: Joints,
+    sliding: np.ndarray,
+    lengths_changed: bool = False,
+) -> StaticSystem:
+    """Blocks at their present places, on virgin joints but for their closure and sliding so far.
 
-    displacement: np.ndarray
-    unstable: np.ndarray
-    verdict: Verdict
-
-
-class EquilibriumSearch:
-    """Search for a static equilibrium from the present places of the blocks.
-
-    The joints are virgin but for their closure and sliding so far (k,), in m. Unknowns are the
-    displacements (m,) of the free motions, scaled by the square root of their inertia, so forces
-    are divided by it and drags have the unit 1/s2.
-
-    lengths_changed: the blocks have moved since the joints closed, so a change of the lengths of
-    joints costs stored energy (see `contact/geometry.py`).
+    sliding (k,) in m. lengths_changed: the blocks have moved since the joints closed, so a change
+    of the lengths of joints costs stored energy (see `contact/geometry.py`).
     """
-
-    def __init__(
-        self,
-        scene: Scene,
-        blocks: Blocks,
-        manager: ContactManager,
-        joints: Joints,
-        sliding: np.ndarray,
-        lengths_changed: bool = False,
-    ) -> None:
-        contacts = manager.contacts
-        self.blocks = blocks
-        self.joints = joints
-        self.contacts = contacts
-        self.k = joints.n
-        to_closure_and_shear = diags(np.repeat([-1.0, 1.0], self.k))
-        rates = opening_and_sliding_rates(blocks, contacts)
-        self.kinematics: csr_array = to_closure_and_shear @ rates
-        self.area = np.tile(contacts.length * scene.thickness, 2)
-        self.start = np.concatenate([manager.closure, sliding])
-        self.root = blocks.inverse_sqrt_inertia[blocks.is_free]
-        self.block = np.nonzero(blocks.is_free)[0]  # of each free motion
-        force = blocks.gravity + blocks.loads
-        if lengths_changed:
-            displacement = np.stack([manager.closure, sliding], axis=1) - joints.delta
-            stored_energy = joints.trial(displacement)[2] * scene.thickness
-            zero = np.zeros(self.k)
-            length_forces = contacts.assemble(blocks.motion, zero, zero, stored_energy)
-            force = force + length_forces * blocks.is_mobile
-        acceleration = np.hypot(*force[:, :2].T) / blocks.inertia[:, 0] / blocks.radius
-        # drag at which the load moves a block by its radius in a step
-        self.drag_of_radius = float(np.median(acceleration[blocks.is_free.any(axis=1)]))
-        self.force = force[blocks.is_free] * self.root
-        self.zero = np.zeros(len(self.block))
-        touched = abs(self.kinematics[: self.k]) + abs(self.kinematics[self.k :])
-        self.island = connected_components(touched.T @ touched, directed=False)[1]
-
-    def expand(self, values: np.ndarray) -> np.ndarray:
-        """Values (n, 3) of all motions from values (m,) of the free ones; zero for the others."""
-        out = np.zeros(self.blocks.is_free.shape)
-        out[self.blocks.is_free] = values
-        return out
-
-    def solve(
-        self, start: np.ndarray, unstable: np.ndarray, name_unstable: bool = True
-    ) -> Solution:
-        """Equilibrium of all blocks but the unstable ones, from displacements `start` (m,).
-
-        unstable (n,): blocks known to be unstable; they stay where they are. With `name_unstable`
-        further unstable blocks are fixed as well, and the others are solved again; else the search
-        ends with the first verdict.
-        """
-        known_unstable = unstable
-        unstable = unstable.copy()
-        relaxation = self._relaxation()
-        relaxation.fix(unstable)
-        verdict = Verdict.EQUILIBRIUM
-        y = start
-        while True:
-            is_fixed = unstable[self.block]
-            relaxed = relaxation.relax(self.expand(y), partial(self._finish, is_fixed))
-            displacement = relaxed.y[self.blocks.is_free]
-            if relaxed.verdict is Verdict.EQUILIBRIUM:
-                if (is_released := unstable & ~known_unstable).any():
-                    displacement = self._creep(displacement, unstable, is_released)
-                return Solution(displacement, unstable, verdict)
-            if not name_unstable:
-                return Solution(displacement, unstable, relaxed.verdict)
-            if relaxed.verdict is Verdict.NOT_DECIDED:
-                verdict = relaxed.verdict
-            is_new = self._is_moving(relaxed.growth) & ~unstable
-            if not is_new.any():
-                return Solution(displacement, unstable, Verdict.NOT_DECIDED)
-            unstable |= is_new
-            y = self._release(start, displacement, unstable)
-            relaxation.fix(unstable)
-            if unstable[self.block].all():
-                displacement = self._creep(y, unstable, unstable & ~known_unstable)
-                return Solution(displacement, unstable, verdict)
-
-    def _relaxation(self) -> Relaxation:
-        """The relaxation of the blocks on the contacts of this search."""
-        joints, contacts = self.joints, self.contacts
-        opening_to_closure = np.array([-1.0, 1.0])[:, None]
-        tensile = joints.tensile_stiffness[joints.law]
-
-        def stiffness_at(closure: np.ndarray) -> np.ndarray:
-            return np.maximum(joints.interpolate("stiffness", "closure", closure), tensile)
-
-        high_stress = np.full(self.k, HIGH_STRESS)
-        return Relaxation(
-            [one.law for one in joints.by_law],
-            joints.law,
-            contacts.block_a,
-            contacts.block_b,
-            contact_kinematics(self.blocks, contacts) * opening_to_closure,
-            self.area[: self.k],
-            self.start.reshape(2, -1).T,
-            self.expand(self.force),
-            self.blocks.is_free,
-            stiffness_at,
-            np.maximum(joints.interpolate("stiffness", "stress", high_stress), tensile),
-            joints.reduction[1],
-        )
-
-    def _finish(self, is_fixed: np.ndarray, y: np.ndarray) -> np.ndarray | None:
-        """Newton's method from displacements y (n, 3); is_fixed (m,): motions that stay."""
-        start = y[self.blocks.is_free]
-        displacement, _, converged = self._step(
-            start, FIXING_DRAG * is_fixed, max_iterations=MAX_FINISHING_ITERATIONS
-        )
-        return self.expand(displacement) if converged.all() else None
-
-    def _distance(self, displacement: np.ndarray) -> np.ndarray:
-        """Largest displacement (n,) in m of each block at scaled displacements (n, 3)."""
-        x, y, rotation = np.abs(displacement * self.blocks.inverse_sqrt_inertia).T
-        return np.hypot(x, y) + rotation * self.blocks.radius
-
-    def _is_moving(self, growth: np.ndarray) -> np.ndarray:
-        """Mask (n,) of blocks whose displacement in `growth` is more than a fraction of the largest
-        one.
-
-        growth: scaled displacements (n, 3).
-        """
-        distance = self._distance(growth)
-        return distance > UNSTABLE_FRACTION * distance.max(initial=0.0)
-
-    def _release(self, start: np.ndarray, end: np.ndarray, unstable: np.ndarray) -> np.ndarray:
-        """Displacements (m,) from which the others are solved.
-
-        Unstable blocks (n,) have moved from `start` (m,) towards `end` (m,) by no more than a few
-        closures.
-        """
-        closure = self.start[: self.k] + (self.kinematics @ start)[: self.k]
-        limit = RELEASE_CLOSURES * max(closure.max(initial=0.0), MIN_LENGTH)
-        distance = self._distance(self.expand(end - start))
-        fraction = unstable * np.minimum(1.0, limit / np.maximum(distance, 1e-300))
-        return start + fraction[self.block] * (end - start)
-
-    def _creep(self, y: np.ndarray, unstable: np.ndarray, is_released: np.ndarray) -> np.ndarray:
-        """Displacements (m,) of the start: the others in equilibrium with creeping unstable blocks.
-
-        y (m,): equilibrium with the unstable blocks (n,) fixed. The ones that `is_released` (n,)
-        creep from their places in implicit steps through a drag, until they no longer release
-        forces; so their joints are at their limits, and the result does not depend on rounding in
-        the relaxation. It is y where a step does not converge.
-        """
-        creeps = is_released[self.block]
-        creep_drag = max(RELEASE_DRAG * self._median_stiffness(y), 1e3 * self.drag_of_radius)
-        drag = np.where(creeps, creep_drag, FIXING_DRAG * unstable[self.block])
-        displacement = np.where(creeps, 0.0, y)
-        residual = np.inf
-        for _ in range(MAX_RELEASE_STEPS):
-            displacement, unbalanced, converged = self._step(displacement, drag)
-            if not converged.all():
-                return y
-            previous_residual = residual
-            residual = float(np.linalg.norm(unbalanced))
-            if residual > MIN_RELEASE_RATIO * previous_residual:
-                break
-        return displacement
-
-    def _median_stiffness(self, y: np.ndarray) -> float:
-        """Median stiffness of the free motions at displacements y (m,), in 1/s2."""
-        stiffness = self._assemble_stiffness(self._unbalanced(y)[1]).diagonal()
-        return float(np.median(stiffness[stiffness > 0])) if (stiffness > 0).any() else 0.0
-
-    def _assemble_stiffness(self, C: csr_array) -> csc_array:
-        """Stiffness (m, m) of the blocks from the stiffness C (2 k, 2 k) of the joints."""
-        return (self.kinematics.T @ (diags(self.area) @ C) @ self.kinematics).tocsc()
-
-    def stick_predictor(self) -> np.ndarray:
-        """First guess (m,): displacements if no joint can slide.
-
-        One step through a drag with which a free block falls by a tenth of its radius; as near to
-        its end as Newton's method comes.
-        """
-        drag = self.drag_of_radius / PREDICTOR_FALL + self.zero
-        y, _, _ = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
-        return y
-
-    def _unbalanced(self, y: np.ndarray, can_slide: bool = True) -> tuple[np.ndarray, csr_array]:
-        """Unbalanced forces (m,) and stiffness of the joints (2 k, 2 k) at displacements y (m,)."""
-        d = (self.start + self.kinematics @ y).reshape(2, -1).T
-        if can_slide:
-            F, C, _ = self.joints.trial(d)
-        else:
-            F, C = self.joints.stick_predictor(d)
-        nn, ns, sn, ss = (diags(part) for part in C.reshape(-1, 4).T)
-        joint_stiffness = csr_array(bmat([[nn, ns], [sn, ss]]))
-        joint_forces = self.kinematics.T @ (self.area * F.T.ravel())
-        return self.force - joint_forces, joint_stiffness
-
-    def _step(
-        self,
-        y: np.ndarray,
-        drag: np.ndarray,
-        tolerance: float = SOLUTION_TOLERANCE,
-        can_slide: bool = True,
-        max_iterations: int = MAX_ITERATIONS,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """One implicit step from y (m,) through a drag (m,); without drag, to the equilibrium.
-
-        Newton's method, with damping where the residual does not fall, in each island by itself.
-        Returns displacements (m,), unbalanced forces (m,), and whether the step converged in the
-        island of each motion (m,).
-        """
-        island = self.island
-        start = y
-        is_movable = drag < FIXING_DRAG
-
-        def norms(values: np.ndarray) -> np.ndarray:
-            return np.sqrt(np.bincount(island, values * values))
-
-        def evaluate(y: np.ndarray):
-            unbalanced, C = self._unbalanced(y, can_slide)
-            residual = (unbalanced - drag * (y - start)) * is_movable
-            return unbalanced, C, residual, norms(residual)
-
-        unbalanced, C, residual, size = evaluate(y)
-        target = tolerance * norms(self.force)
-        damping = 0.0 * target
-        is_active = size > target
-        for _ in range(max_iterations):
-            if not is_active.any():
-                break
-            K = self._assemble_stiffness(C)
-            min_damping = MIN_DAMPING * K.diagonal().max() + 1.0
-            needs_damping = is_active
-            step = self.zero
-            for _ in range(MAX_DAMPINGS):
-                diagonal = drag + damping[island] + REGULARISATION * min_damping
-                solution = spsolve((K + diags(diagonal)).tocsc(), residual)
-                step = np.where(needs_damping[island], solution, step)
-                trial = evaluate(y + step * is_active[island])
-                needs_damping = is_active & ~(trial[-1] < size)
-                if not needs_damping.any():
-                    break
-                increased = np.maximum(DAMPING_INCREASE * damping, min_damping)
-                damping = np.where(needs_damping, increased, damping)
-            is_active = is_active & ~needs_damping
-            y = y + step * is_active[island]
-            unbalanced, C, residual, size = evaluate(y) if needs_damping.any() else trial
-            is_undamped = is_active & (damping <= min_damping)
-            damping = np.where(is_undamped, 0.0, damping / DAMPING_DECREASE)
-            is_active = is_active & (size > target)
-        return y, unbalanced, (size <= ACCEPTED_RESIDUAL * target)[island]
+    contacts = manager.contacts
+    force = blocks.gravity + blocks.loads
+    start = np.stack([manager.closure, sliding], axis=1)
+    if lengths_changed:
+        stored_energy = joints.trial(start - joints.delta)[2] * scene.thickness
+        zero = np.zeros(joints.n)
+        length_forces = contacts.assemble(blocks.motion, zero, zero, stored_energy)
+        force = force + length_forces * blocks.is_mobile
+    opening_to_closure = np.array([-1.0, 1.0])[:, None]
+    return StaticSystem(
+        blocks.inertia[:, 0],
+        blocks.radius,
+        blocks.is_free,
+        blocks.inverse_sqrt_inertia,
+        force,
+        contacts.block_a,
+        contacts.block_b,
+        contact_kinematics(blocks, contacts) * opening_to_closure,
+        contacts.length * scene.thickness,
+        start,
+        joints,
+    )
 
 
 def create_joints(
@@ -462,7 +195,8 @@ def settle(
         joints.rearrange(old_row, manager.law, manager.edge_pairs)
         sliding = np.append(sliding, 0.0)[old_row]
         apply_loads(scene, blocks, manager)
-        search = EquilibriumSearch(scene, blocks, manager, joints, sliding, n_round > 0)
+        system = static_system(scene, blocks, manager, joints, sliding, n_round > 0)
+        search = EquilibriumSearch(system)
         is_near = n_round or scene.in_situ is not None
         guess = search.zero if is_near else search.stick_predictor()
         displacement, unstable, round_verdict = search.solve(guess, unstable)
@@ -495,7 +229,7 @@ def equilibrium_displacements(
     joints = Joints(scene)
     manager = ContactManager(scene, blocks.motion)
     sliding = create_joints(scene, blocks, manager, joints)
-    search = EquilibriumSearch(scene, blocks, manager, joints, sliding)
+    search = EquilibriumSearch(static_system(scene, blocks, manager, joints, sliding))
     known_unstable = np.zeros(len(blocks.is_free), bool) if unstable is None else unstable
     contacts = manager.contacts
     has_moved_away = known_unstable[contacts.block_a] | known_unstable[contacts.block_b]

@@ -18,6 +18,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 from ..contact import Contacts, Joints, Outlines
 from ..scene import Scene, SceneError
 from .blocks import Blocks
+from .search import free_motion_matrix
 
 MAX_FRACTION_OF_LIMIT = 0.98  # largest time step, relative to the limit
 MAX_STIFFNESS_GROWTH = 1.25  # of a joint between two checks of the time step
@@ -162,15 +163,8 @@ def opening_and_sliding_rates(blocks: Blocks, contacts: Contacts) -> csr_array:
     Opening rates (k,) along the normal, then sliding rates (k,): `contact_kinematics` without the
     prescribed motions.
     """
-    k = len(contacts.closure)
-    block = np.concatenate([contacts.block_a, contacts.block_b])
-    of_a, of_b = np.split(contact_kinematics(blocks, contacts).transpose(1, 0, 2), 2, axis=2)
-    entries = np.concatenate([of_a, of_b], axis=1)  # (2, 2 k, 3)
-    row = np.tile(np.arange(2 * k).reshape(2, k), 2)[:, :, None]
-    column = 3 * block[:, None] + np.arange(3)
-    places = tuple(place.ravel() for place in np.broadcast_arrays(row, column))
-    matrix = csr_array((entries.ravel(), places), shape=(2 * k, blocks.is_free.size))
-    return matrix[:, blocks.is_free.ravel()]
+    kinematics = contact_kinematics(blocks, contacts)
+    return free_motion_matrix(contacts.block_a, contacts.block_b, kinematics, blocks.is_free)
 
 
 def largest_step(rates: csr_array, stiffness: np.ndarray, dashpot: np.ndarray) -> float:

@@ -13,11 +13,12 @@ from dem_demo.contact import ContactManager, Joints
 from dem_demo.dynamics import relaxation
 from dem_demo.dynamics.blocks import Blocks
 from dem_demo.dynamics.equilibrium import (
-    EquilibriumSearch,
     create_joints,
     equilibrium_displacements,
+    static_system,
 )
 from dem_demo.dynamics.relaxation import Relaxation, Verdict
+from dem_demo.dynamics.search import EquilibriumSearch
 from dem_demo.studies.strength import alone, factor_of_safety, weakened
 
 
@@ -26,7 +27,7 @@ def search_of(scene):
     joints = Joints(scene)
     manager = ContactManager(scene, blocks.motion)
     sliding = create_joints(scene, blocks, manager, joints)
-    return EquilibriumSearch(scene, blocks, manager, joints, sliding)
+    return EquilibriumSearch(static_system(scene, blocks, manager, joints, sliding))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Contact: corners on edges, the identity of contacts, the joints between blocks.
 
+rows           a contact point as the rest of the demo reads it, in the plane and in space
 geometry       closure, sliding and length of joint at corners on edges
 manager        which corners are on which edges, and the identity of contacts in time
 joints         a pool of joints for each law, and its first-loading curve
@@ -8,11 +9,13 @@ joints         a pool of joints for each law, and its first-loading curve
 from .geometry import Contacts, Outlines
 from .joints import STATE_PARTS, Joints, tabulate_first_loading
 from .manager import MAX_SKIN_UNTIL_REBUILD, ContactManager
+from .rows import ContactRows
 
 __all__ = [
     "MAX_SKIN_UNTIL_REBUILD",
     "STATE_PARTS",
     "ContactManager",
+    "ContactRows",
     "Contacts",
     "Joints",
     "Outlines",

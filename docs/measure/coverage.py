@@ -1,6 +1,6 @@
 """How often the 95 % intervals and bands of fits of shear tests contain the true values.
 
-    python docs/measure/coverage.py [--draws 40] [--case "white noise"]
+    python docs/measure/coverage.py [--draws 40] [--case "white noise"] [--results FILE]
 
 Direct shear tests of a known law, with opening, and with the noise of each case; free are mu, a and
 mating_length. Columns: draws whose interval of a parameter contains the true value; draws whose
@@ -17,9 +17,14 @@ two other normal stresses; draws whose report warns that the law has another sha
 
 The law that makes the tests has cells and steps so fine that finer ones change it by 0.1 %; the
 fits choose their own.
+
+`--results` names a file to which each draw is appended. A later command with the same file and the
+same code repeats none of the draws in it, so that a command that was stopped can be continued.
 """
 
+import json
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from common import print_table, run_command
@@ -132,40 +137,62 @@ def draw_tests(case, law, paths, rng):
     return curves
 
 
-def coverage(draws=40, case=""):
+def coverage(draws=40, case="", results=""):
     """Print the table of all cases, or of one."""
+    finished = read_draws(results)
     rows = []
     for name in [case] if case else CASES:
-        rows.append([name, *cover(CASES[name], name, draws)])
+        hits = np.sum(cover(name, draws, finished, results), axis=0)
+        rows.append([name, *(f"{count}/{draws}" for count in hits)])
     head = ["case", *(f"`{name}`" for name in TRUE_PARAMETERS)]
     for stress in PREDICTED_STRESSES:
         head += [f"peak at {stress / 1e6:g} MPa", f"opening at {stress / 1e6:g} MPa"]
     print_table([*head, "report warns"], rows)
 
 
-def cover(case, name, draws):
-    """The cells of one row."""
+def read_draws(results):
+    """The results of finished draws by case and seed; empty without a file."""
+    if not results or not Path(results).exists():
+        return {}
+    draws = map(json.loads, Path(results).read_text(encoding="utf-8").splitlines())
+    return {(name, seed): hits for name, seed, hits in draws}
+
+
+def cover(name, draws, finished, results):
+    """What the intervals and bands of each draw of a case contain, (draws, columns)."""
+    case = CASES[name]
     law = make_law(**TRUE_PARAMETERS, **case.changes)
     paths = {normal: displacements(case, law, normal) for normal in case.stresses}
     new_shear = np.linspace(0.0, END, 21)
     targets = {stress: exact_test(law, new_shear, stress) for stress in PREDICTED_STRESSES}
-    hits = np.zeros(len(TRUE_PARAMETERS) + 2 * len(targets) + 1, int)
+    rows = []
     for seed in track(range(draws), name, draws):
-        curves = draw_tests(case, law, paths, np.random.default_rng((7, seed)))
-        fit = jl.fit_curves(curves, law=make_law(**START), free=tuple(TRUE_PARAMETERS))
-        row = []
-        for parameter, value in TRUE_PARAMETERS.items():
-            low, high = fit.interval(parameter)
-            row.append(low <= value <= high)
-        for normal, (stress, opening) in targets.items():
-            curve = jl.ShearCurve(new_shear, np.ones(new_shear.size), normal)
-            (points,) = (test.points for test in fit.predict_shear(curve))
-            stress_band, opening_band = fit.shear_band(curve)[:, :, points]
-            peak = int(np.argmax(stress))
-            row.append(stress_band[0, peak] <= stress[peak] <= stress_band[1, peak])
-            row.append(opening_band[0, -1] <= opening[-1] <= opening_band[1, -1])
-        hits += np.array([*row, any(fit.shape_differs)])
-    return [*(f"{count}/{draws}" for count in hits[:-1]), hits[-1]]
+        hits = finished.get((name, seed))
+        if hits is None:
+            curves = draw_tests(case, law, paths, np.random.default_rng((7, seed)))
+            hits = find_hits(curves, new_shear, targets)
+            if results:
+                with Path(results).open("a", encoding="utf-8") as file:
+                    file.write(json.dumps([name, seed, hits]) + "\n")
+        rows.append(hits)
+    return rows
+
+
+def find_hits(curves, new_shear, targets):
+    """Whether each interval and band of a fit contains the true value, and whether it warns."""
+    fit = jl.fit_curves(curves, law=make_law(**START), free=tuple(TRUE_PARAMETERS))
+    hits = []
+    for parameter, value in TRUE_PARAMETERS.items():
+        low, high = fit.interval(parameter)
+        hits.append(low <= value <= high)
+    for normal, (stress, opening) in targets.items():
+        curve = jl.ShearCurve(new_shear, np.ones(new_shear.size), normal)
+        (points,) = (test.points for test in fit.predict_shear(curve))
+        stress_band, opening_band = fit.shear_band(curve)[:, :, points]
+        peak = int(np.argmax(stress))
+        hits.append(stress_band[0, peak] <= stress[peak] <= stress_band[1, peak])
+        hits.append(opening_band[0, -1] <= opening[-1] <= opening_band[1, -1])
+    return [bool(hit) for hit in [*hits, any(fit.shape_differs)]]
 
 
 if __name__ == "__main__":

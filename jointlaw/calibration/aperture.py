@@ -140,7 +140,7 @@ def read_flow(
     has_closure = bool(flow_table.find_columns(CLOSURE))
     if has_closure:
         columns.append(flow_table.column(CLOSURE))
-    (stress, values, *closure), notes = flow_table.complete_rows(columns, outliers)
+    (stress, values, *closure), _, notes = flow_table.complete_rows(columns, outliers)
     if has_pressure:
         assert conditions is not None
         _require_larger(path, "pressure", values, conditions.outlet_pressure, "outlet pressure")

@@ -1,9 +1,14 @@
 """Laboratory tests in files: the data sets of the package, and files of laboratories.
 
 - **Tare.** An initial shear stress of 2 to 10 % of the largest is subtracted as tare; a smaller one
-  is scatter. In both cases displacement and opening count from the first row. With a larger initial
-  shear stress, shear began before the first row: displacements that do not begin near zero are then
-  refused.
+  is scatter. In both cases displacement and opening count from the first row.
+- **Initial load.** A larger shear stress at zero displacement is an initial load, as before an
+  injection. With a displacement above zero shear began before the first row: displacements that do
+  not begin near zero are refused.
+- **One test.** A displacement that returns to its start in one row, without a shear stress against
+  this motion, is the beginning of another test: the file is refused.
+- **Unloading.** The last rows are left out where the shear stress falls by half without further
+  displacement: their stress is not the residual shear stress.
 - **Normal stress.** If it varies by less than 5 %, its mean is used, otherwise the value of each
   row.
 - **Notes.** All changes to a record, and unused rows, are in the `notes` of its curve.
@@ -46,6 +51,10 @@ SHEAR = Quantity(
         "ds",
         "horizontal_displacement",
         "shear_2",
+        "δs",
+        "δ_s",
+        "scherweg",
+        "schubweg",
     ),
     "--shear-column",
     ambiguous_aliases=("displacement", "disp", "u"),
@@ -53,26 +62,32 @@ SHEAR = Quantity(
 SHEAR_STRESS = Quantity(
     "shear stress (of a force give the area: --area 100cm2)",
     "Pa",
-    ("shear_stress", "tau", "τ", "f2"),
+    ("shear_stress", "tau", "τ", "f2", "scherspannung", "schubspannung"),
     "--shear-stress-column",
 )
 NORMAL = Quantity(
     "normal stress (or give it: --normal-stress 1MPa)",
     "Pa",
-    ("normal_stress", "sigma_n", "σn", "σ_n", "sigma", "sn", "f1"),
+    ("normal_stress", "sigma_n", "σn", "σ_n", "sigma", "sn", "f1", "normalspannung"),
     "--normal-column",
 )
 SHEAR_FORCE = Quantity(
     "shear force",
     "N",
-    ("shear_force", "horizontal_force", "fs", "t"),
+    ("shear_force", "horizontal_force", "shear_load", "horizontal_load", "fs", "t", "scherkraft"),
     "--shear-stress-column",
 )
 NORMAL_FORCE = Quantity(
     "normal force (or give the stress: --normal-stress 1MPa)",
     "N",
-    ("normal_force", "vertical_force", "fn", "n"),
+    ("normal_force", "vertical_force", "normal_load", "vertical_load", "fn", "n", "normalkraft"),
     "--normal-column",
+)
+CLOSURE_FORCE = Quantity(
+    "normal force of the closure test",
+    "N",
+    (*NORMAL_FORCE.aliases, "axial_force", "axial_load", "force", "load"),
+    "--stress-column",
 )
 OPENING = Quantity(
     "opening",
@@ -88,6 +103,17 @@ OPENING = Quantity(
         "u_n",
         "dn",
         "uv",
+        "dilatation",
+        "dilatanz",
+        "vertical_disp",
+        "normal_deformation",
+        "vertical_deformation",
+        "vertikalverschiebung",
+        "vertikalweg",
+        "δn",
+        "δ_n",
+        "dv",
+        "v",
     ),
     "--opening-column",
 )
@@ -126,7 +152,27 @@ PEAKS = (
 MAX_CONSTANT_STRESS_CHANGE = 0.05  # of the mean normal stress
 MAX_SCATTER = 0.02  # of the largest shear stress: a larger initial shear stress is tare
 MAX_TARE = 0.1  # of the largest shear stress
+MAX_ZERO_READING = 1e-3  # of the range of the displacement: the displacement of an initial load
+MIN_RESTART = 0.3  # of the range of the displacement, in one row
+MAX_RESTART_STRESS = 0.05  # of the largest shear stress: less does not move a joint back
+MAX_TAIL_DISPLACEMENT = 0.05  # of the range: while a test is unloaded at its end
+MAX_TAIL_STRESS = 0.5  # of the shear stress before
+MAX_LOADED_DROP = 0.1  # likewise: a row with less is still loaded
 MAX_INITIAL_READING = {"shear": 0.1, "opening": 0.5}  # of the range, if shear began earlier
+
+
+class ClosureRecord(NamedTuple):
+    """A closure test from a file.
+
+    stress: normal stress in Pa, (n,). closure: in m, (n,), in the order measured.
+    notes: on unused rows.
+    source: which column was read as which quantity.
+    """
+
+    stress: Array
+    closure: Array
+    notes: list[str]
+    source: str
 
 
 def names() -> list[str]:
@@ -137,7 +183,8 @@ def names() -> list[str]:
 def load(name: str) -> tuple[Array, Array]:
     """Stress (Pa) and closure (m) of a data set, loading and unloading in the order measured."""
     one_of("data set", name, tuple(names()))
-    return read_closure(_FOLDER / f"{name}.csv")[:2]
+    record = read_closure(_FOLDER / f"{name}.csv")
+    return record.stress, record.closure
 
 
 def read_closure(
@@ -146,7 +193,8 @@ def read_closure(
     closure: str | None = None,
     decimal: str | None = None,
     outliers: str | None = None,
-) -> tuple[Array, Array, list[str]]:
+    area: float | None = None,
+) -> ClosureRecord:
     """Read the closure test of a text file or spreadsheet.
 
     Parameters
@@ -156,23 +204,52 @@ def read_closure(
         "Disp:-1mm" if closing counts negative). None finds columns with the usual names.
     decimal: decimal mark, "comma" or "point"; None detects it from the numbers of the file.
     outliers: "skip" or "keep" for rows that may be no measurement; None refuses them.
+    area: area in m2 on which the force acts, if the file has a force instead of a stress.
 
-    Returns stress (Pa), closure (m), (n,) each, and notes on unused rows. Raises
-    ValueError naming file, column or line, and the command-line option that helps.
+    Raises ValueError naming file, column or line, and the command-line option that helps.
     """
-    quantities = [(STRESS, stress), (CLOSURE, closure)]
-    table, *more = read_tables(Path(path), quantities, decimal)
+    load = STRESS if area is None else CLOSURE_FORCE
+    table, *more = read_tables(Path(path), [(load, stress), (CLOSURE, closure)], decimal)
     if more:
         raise ValueError(f"{path}: holds {1 + len(more)} tests; give a file with one closure test")
-    stress_column = table.column(STRESS, stress)
-    closure_column = table.column(CLOSURE, closure)
-    (s, u), notes = table.complete_rows([stress_column, closure_column], outliers)
+    _require_area(table, area, STRESS, CLOSURE_FORCE, "--closure-area", stress)
+    columns = [table.column(load, stress), table.column(CLOSURE, closure)]
+    (s, u), _, notes = table.complete_rows(columns, outliers)
     peak_row = int(np.argmax(np.abs(s)))
-    _require_sign(s[peak_row] > 0, stress_column, STRESS, "has compression negative", table)
+    _require_sign(s[peak_row] > 0, columns[0], load, "has compression negative", table)
     closes = u[peak_row] >= u[0]
-    _require_sign(closes, closure_column, CLOSURE, "falls while the stress rises", table)
+    _require_sign(closes, columns[1], CLOSURE, "falls while the stress rises", table)
+    source = _describe_columns(load=columns[0], closure=columns[1])
+    if area is not None:
+        s = s / area
+        notes.append(f"stress is force over an area of {1e4 * area:.6g} cm2")
     require_rock({"stress": s[peak_row], "closure": float(np.ptp(u))}, f"{path}: ")
-    return s, u, notes
+    return ClosureRecord(s, u, notes, source)
+
+
+def _require_area(
+    table: FileTable,
+    area: float | None,
+    stress: Quantity,
+    force: Quantity,
+    option: str,
+    override: str | None,
+) -> None:
+    """Raise ValueError for forces without an area, or an area without forces."""
+    if override is not None:
+        return
+    has_stress = bool(table.find_columns(stress))
+    has_force = bool(table.find_columns(force))
+    if area is None and has_force and not has_stress:
+        raise ValueError(f"{table.name}: has forces; give the area, {option} 100cm2")
+    if area is not None and has_stress and not has_force:
+        raise ValueError(f"{table.name}: has stresses, not forces: leave {option} out")
+
+
+def _describe_columns(**columns: Column) -> str:
+    """Which column was read as which quantity, for a report."""
+    parts = (f"{column.title} is {name.replace('_', ' ')}" for name, column in columns.items())
+    return ", ".join(parts)
 
 
 def read_shear(path: str | Path, decimal: str | None = None, **options: Any) -> list[ShearCurve]:
@@ -183,7 +260,8 @@ def read_shear(path: str | Path, decimal: str | None = None, **options: Any) -> 
     path, decimal: as in `read_closure`.
     shear, stress, normal, opening: names of columns, with units if the file gives none ("tau:MPa",
         or "tau:-1MPa" to change the sign). None finds columns with the usual names. If the joint
-        closes while it shears, a factor ("dn:1mm") confirms the sign of the opening.
+        closes while it shears, a factor ("dn:1mm") confirms the sign of the opening. Several
+        names of openings, "A,B,C,D:mm", are gauges, whose mean is used.
     normal_stress: normal stress in Pa of all tests of the file, instead of a column.
     outliers: as in `read_closure`.
     area: area in m2 on which the forces act, if the file has forces.
@@ -209,17 +287,31 @@ def _shear_test(
 ) -> ShearCurve:
     """One direct shear test, by the rules at the top of this module."""
     has_forces = area is not None
-    quantities = {
-        "shear": (SHEAR, shear),
-        "stress": (SHEAR_FORCE if has_forces else SHEAR_STRESS, stress),
-    }
+    stress_quantity = SHEAR_FORCE if has_forces else SHEAR_STRESS
+    _require_area(table, area, SHEAR_STRESS, SHEAR_FORCE, "--area", stress)
+    quantities = {"shear": (SHEAR, shear), "stress": (stress_quantity, stress)}
     if normal_stress is None:
         quantities["normal"] = (NORMAL_FORCE if has_forces else NORMAL, normal)
+    columns = {name: table.column(*quantity) for name, quantity in quantities.items()}
+    gauges = list[Column]()
     if opening is not None or table.find_columns(OPENING):
         quantities["opening"] = (OPENING, opening)
-    columns = {name: table.column(*quantity) for name, quantity in quantities.items()}
-    values, notes = table.complete_rows([*columns.values()], outliers)
-    readings = dict(zip(columns, values, strict=True))
+        gauges = table.gauges(OPENING, opening)
+        columns["opening"] = gauges[0]
+    complete = table.complete_rows([*columns.values(), *gauges[1:]], outliers)
+    readings = dict(zip(columns, complete.values, strict=False))
+    notes = complete.notes
+    source = _describe_columns(**columns)
+    if len(gauges) > 1:
+        readings["opening"], note = _mean_of_gauges(gauges, complete.values[-len(gauges) :])
+        notes.append(note)
+    elif not gauges and (lengths := table.unused_lengths(columns.values())):
+        notes.append(
+            f"no opening is read; columns of lengths that are not used: {', '.join(lengths)}. If "
+            "one measures the opening, name it: --opening-column"
+        )
+    if outliers != "keep":
+        _require_one_test(readings, complete.lines, table)
     zeroed = _subtract_initial_readings(readings, columns, table)
     notes += zeroed.notes
     x, y, up = zeroed.shear, zeroed.stress, zeroed.opening
@@ -229,22 +321,98 @@ def _shear_test(
         y = y / contact_area
         sigma = sigma / (contact_area if normal_stress is None else 1.0)
     _require_signs(x, y, sigma, up, columns, quantities, table)
+    tail = _unloading_rows(x, y)
+    if tail:
+        notes.append(
+            f"{tail} rows at the end are unloading, from {abs(y[-tail - 1]):.4g} to "
+            f"{abs(y[-1]):.4g} Pa without further displacement: they are left out"
+        )
+        x, y, sigma = x[:-tail], y[:-tail], sigma[:-tail]
+        up = None if up is None else up[:-tail]
     mean = float(np.mean(sigma))
-    _require_plausible_test(x, np.abs(y), sigma, f"{table.name}: ")
+    _require_plausible_test(x, np.abs(y), sigma, f"{table.name}: ", up)
     label = f"{Path(table.name).name}, {mean / 1e6:.3g} MPa"
     is_constant = np.ptp(sigma) <= MAX_CONSTANT_STRESS_CHANGE * mean
     return ShearCurve(
-        x, y, mean if is_constant else sigma, opening=up, name=label, notes=tuple(notes)
+        x,
+        y,
+        mean if is_constant else sigma,
+        opening=up,
+        name=label,
+        notes=tuple(notes),
+        source=source,
+        initial_stress=float(y[0]) if zeroed.is_loaded else 0.0,
     )
 
 
+def _mean_of_gauges(gauges: list[Column], values: list[Array]) -> tuple[Array, str]:
+    """The mean (n,) of gauges of one displacement, and a note with their largest difference."""
+    changes = np.array([column - column[0] for column in values])
+    difference = float(np.max(np.ptp(changes, axis=0)))
+    titles = ", ".join(gauge.title for gauge in gauges)
+    note = (
+        f"the opening is the mean of {len(gauges)} gauges, {titles}; they differ by up to "
+        f"{1e3 * difference:.3g} mm"
+    )
+    return np.mean(values, axis=0), note
+
+
+def _require_one_test(readings: dict[str, Array], lines: list[int], table: FileTable) -> None:
+    """Raise ValueError for a second test in the rows of a first one, naming its line.
+
+    Friction opposes slip: a joint that moves back by a large part of the displacement has a shear
+    stress in the direction of this motion. Without it the specimen, or the gauge, was set back.
+    """
+    x = readings["shear"]
+    y = readings["stress"]
+    sense = np.sign(np.sum(np.diff(x) * (y[1:] + y[:-1]))) or 1.0  # of a column with the wrong sign
+    steps = np.diff(x)
+    driving = sense * y[1:] * np.sign(steps) / np.max(np.abs(y))
+    is_large = np.abs(steps) > MIN_RESTART * np.ptp(x)
+    is_back = np.abs(x[1:] - x[0]) < np.abs(x[:-1] - x[0])
+    restarts = np.flatnonzero(is_large & is_back & (driving < MAX_RESTART_STRESS))
+    if restarts.size:
+        row = int(restarts[0]) + 1
+        raise ValueError(
+            f"{table.name}: line {lines[row]}: the shear displacement returns from "
+            f"{1e3 * x[row - 1]:.4g} to {1e3 * x[row]:.4g} mm in one row, without a shear stress "
+            "in this direction, as if another test began: repeat the line of names above it to "
+            "read two tests, remove the rows that do not belong to this test, or, if it is one "
+            "test, write --outliers keep"
+        )
+
+
+def _unloading_rows(x: Array, y: Array) -> int:
+    """Number of rows at the end in which the shear stress falls without further displacement.
+
+    Parameters
+    ----------
+    x: shear displacement in m, (n,).
+    y: shear stress, (n,).
+    """
+    sense = np.sign(x[-1] - x[0])
+    distance = sense * (x - x[-1])
+    # the rows about the last displacement, and what the joint carried there
+    before = np.flatnonzero(np.abs(distance) > MAX_TAIL_DISPLACEMENT * np.ptp(x))
+    start = int(before[-1]) + 1 if before.size else 0
+    carried = float(np.max(np.abs(y[max(start - 1, 0) :])))
+    if not abs(y[-1]) < MAX_TAIL_STRESS * carried:
+        return 0
+    loaded = np.flatnonzero(np.abs(y) >= (1 - MAX_LOADED_DROP) * carried)
+    last = int(loaded[-1])
+    advance = float(np.max(distance[last:])) - float(distance[last])
+    is_tail = last >= start - 1 and advance < 0.1 * MAX_TAIL_DISPLACEMENT * np.ptp(x)
+    return x.size - 1 - last if is_tail else 0
+
+
 class _Zeroed(NamedTuple):
-    """Readings of a shear test from the start of shear."""
+    """Readings of a shear test from the start of shear, or from an initial load."""
 
     shear: Array
     stress: Array
     opening: Array | None
     notes: list[str]
+    is_loaded: bool
 
 
 def _subtract_initial_readings(
@@ -260,6 +428,21 @@ def _subtract_initial_readings(
     notes = list[str]()
     largest = float(np.abs(y).max())
     initial_percent = 100 * abs(y[0]) / largest
+    is_loaded = abs(y[0]) > MAX_TARE * largest and abs(x[0]) <= MAX_ZERO_READING * float(np.ptp(x))
+    if is_loaded:
+        middle = y[np.argmax(np.abs(x - x[0]))]
+        if y[0] * middle < 0:
+            raise ValueError(
+                f"{table.name}: column {columns['stress'].title!r} begins at {initial_percent:.2g} "
+                "% of its largest value, against the shear: subtract it from the column if it is a "
+                "tare, or begin the record where the shear stress is zero"
+            )
+        notes.append(
+            f"the record begins at a shear stress of {initial_percent:.2g} % of the largest: the "
+            "joint is loaded to it first, and displacements count from there"
+        )
+        up = None if up is None else up - up[0]
+        return _Zeroed(x - x[0], y, up, notes, True)
     if abs(y[0]) <= MAX_TARE * largest:
         if abs(y[0]) > MAX_SCATTER * largest:
             notes.append(
@@ -278,7 +461,7 @@ def _subtract_initial_readings(
                 f"with {initial_percent:.2g} % of the largest shear stress, so shear began before: "
                 "add a first row with the readings there and zero shear stress"
             )
-    return _Zeroed(x, y, up, notes)
+    return _Zeroed(x, y, up, notes, False)
 
 
 def _require_signs(
@@ -307,7 +490,9 @@ def _require_signs(
             _require_sign(is_right, columns[name], quantities[name][0], problem, table)
 
 
-def _require_plausible_test(x: Array, tau: Array, sigma: Array, where: str) -> None:
+def _require_plausible_test(
+    x: Array, tau: Array, sigma: Array, where: str, up: Array | None = None
+) -> None:
     """Raise ValueError for magnitudes that a test on rock cannot have: a wrong unit.
 
     Parameters
@@ -316,13 +501,21 @@ def _require_plausible_test(x: Array, tau: Array, sigma: Array, where: str) -> N
     tau: absolute shear stress in Pa, (n,).
     sigma: normal stress in Pa, (n,).
     where: beginning of the message.
+    up: opening in m, (n,), or None.
     """
+    if not np.min(sigma) > 0:
+        raise ValueError(
+            f"{where}normal stress = {np.min(sigma):g} Pa in a row must be > 0; are columns "
+            "exchanged? Leave rows without a normal stress out"
+        )
     magnitudes = {
         "shear displacement": float(np.ptp(x)),
         "shear stress": float(tau.max()),
         "normal stress": float(np.mean(sigma)),
         "peak shear stress over normal stress": float(np.max(tau / sigma)),
     }
+    if up is not None:
+        magnitudes["opening over shear displacement"] = float(np.ptp(up) / np.ptp(x))
     require_rock(magnitudes, where)
 
 

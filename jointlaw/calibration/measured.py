@@ -58,6 +58,7 @@ class ClosureCurve:
     compliance: of rock and machine, whose deformation the test measured too: closure per stress in
         m/Pa. It is subtracted from `closure`; 0 if the joint alone was measured.
     name, notes: name of the test in reports, and changes made to its record.
+    source: where the numbers are from, for reports.
 
     `preload_closure` is the closure (m) of the law at the origin of the measured closure. It is
     known if the first row has zero stress; otherwise it is None, and fitted. Several rows of zero
@@ -76,6 +77,7 @@ class ClosureCurve:
     compliance: float = 0.0
     name: str = "closure"
     notes: tuple[str, ...] = ()
+    source: str = ""
     preload_closure: float | None = field(init=False)
     series: tuple[Series, ...] = field(init=False, repr=False)
 
@@ -202,6 +204,11 @@ class ShearCurve:
         was not measured. Shear stress alone cannot separate friction from dilation.
     opening_noise: as `noise`, relative to the largest opening; None expects 3 %.
     name, notes: name of the test in reports, and changes made to its record.
+    source: where the numbers are from, for reports.
+    initial_stress: shear stress in Pa at which the record begins, under the first normal stress, as
+        of a joint under load before an injection. The law is sheared up to this stress first;
+        displacement and opening count from there. It must be the first of `shear_stress`, at zero
+        displacement.
 
     >>> curve = jl.ShearCurve(sheared.shear, sheared.shear_stress, normal=5e6)
     """
@@ -215,6 +222,8 @@ class ShearCurve:
     opening_noise: float | None = None
     name: str = "shear"
     notes: tuple[str, ...] = ()
+    source: str = ""
+    initial_stress: float = 0.0
     series: tuple[Series, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -232,6 +241,15 @@ class ShearCurve:
             raise ValueError("shear_stress is zero throughout: there is no strength to fit")
         more_than("normal", np.min(self.normal), 0.0)
         number("azimuth", self.azimuth)
+        number("initial_stress", self.initial_stress)
+        if self.initial_stress and (
+            self.shear[0] != 0.0 or self.shear_stress[0] != self.initial_stress
+        ):
+            raise ValueError(
+                f"initial_stress = {self.initial_stress:g} Pa, but the record begins at "
+                f"{self.shear_stress[0]:g} Pa and {self.shear[0]:g} m: it must be the first shear "
+                "stress, at zero displacement"
+            )
         if self.opening is not None and not self.opening.any():
             raise ValueError("opening is zero throughout: leave it out if it was not measured")
         object.__setattr__(self, "series", self._make_series())
@@ -330,7 +348,12 @@ class ShearCurve:
             stresses.append(np.interp(stops, [0.0, *points], normal))
             start = float(displacements[-1][-1])
             first = end + 1
-        return ShearPath(np.concatenate(displacements), np.concatenate(stresses), np.array(rows))
+        return ShearPath(
+            np.concatenate(displacements),
+            np.concatenate(stresses),
+            np.array(rows),
+            self.initial_stress,
+        )
 
     def predict(self, law: JointLaw, steps: int = INITIAL_STEPS) -> tuple[Array, Array]:
         """Shear stress (Pa) and opening (m) of a law at the measured points, (n,) each.

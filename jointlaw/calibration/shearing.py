@@ -11,6 +11,8 @@ from ..laws.joint_law import JointLaw
 from ..support.checks import Array
 
 TOLERANCE = 1e-9  # of the normal stress
+# displacements of the loading to an initial shear stress over the displacement of the test
+INITIAL_LOADING = np.geomspace(1e-3, 10.0, 60)
 
 
 class ShearPath(NamedTuple):
@@ -19,11 +21,14 @@ class ShearPath(NamedTuple):
     shear: displacement in m, (rows,).
     normal: normal stress in Pa, (rows,).
     points: rows of the measured points, (n,).
+    initial_stress: shear stress in Pa that the joint is sheared to before the path, under the first
+        normal stress.
     """
 
     shear: Array
     normal: Array
     points: NDArray[np.intp]
+    initial_stress: float = 0.0
 
 
 class SimulatedTest(NamedTuple):
@@ -50,6 +55,9 @@ class SimulatedTest(NamedTuple):
 def simulate_shear(law: JointLaw, paths: Sequence[ShearPath]) -> list[SimulatedTest]:
     """Simulate shear tests, one joint each.
 
+    A path with an initial stress is preceded by shear up to this stress; if the law cannot carry
+    it, up to its peak. Displacement and opening count from there.
+
     Parameters
     ----------
     law: a law with a plane.
@@ -57,6 +65,50 @@ def simulate_shear(law: JointLaw, paths: Sequence[ShearPath]) -> list[SimulatedT
 
     Raises ValueError, with the remedy, if the law cannot follow a path.
     """
+    loaded = [k for k, path in enumerate(paths) if path.initial_stress]
+    tests = dict[int, SimulatedTest]()
+    if loaded:
+        loadings = [_initial_loading(paths[k]) for k in loaded]
+        for k, loading in zip(loaded, _simulate(law, loadings), strict=True):
+            tests[k] = loading
+    extended = [_preceded(path, tests[k]) if k in tests else path for k, path in enumerate(paths)]
+    simulated = _simulate(law, extended)
+    return [_without_start(test, path) for test, path in zip(simulated, paths, strict=True)]
+
+
+def _initial_loading(path: ShearPath) -> ShearPath:
+    """Monotonic shear under the first normal stress, to find the initial displacement."""
+    whole = float(np.sum(np.abs(np.diff(path.shear))))
+    shear = np.sign(path.initial_stress) * whole * np.append(0.0, INITIAL_LOADING)
+    return ShearPath(shear, np.full(shear.size, path.normal[0]), np.arange(shear.size))
+
+
+def _preceded(path: ShearPath, loading: SimulatedTest) -> ShearPath:
+    """The path after the part of `loading` up to its initial stress."""
+    stress = np.abs(loading.stress)
+    target = abs(path.initial_stress)
+    peak = int(np.argmax(stress))
+    row = int(np.argmax(stress >= target)) if stress[peak] >= target else peak
+    start = float(loading.shear[row])
+    if stress[row] > target:
+        start = float(
+            np.interp(target, stress[row - 1 : row + 1], loading.shear[row - 1 : row + 1])
+        )
+    before = loading.shear[:row]
+    shear = np.concatenate([before, start + path.shear])
+    normal = np.concatenate([np.full(row, path.normal[0]), path.normal])
+    return ShearPath(shear, normal, path.points + row)
+
+
+def _without_start(test: SimulatedTest, path: ShearPath) -> SimulatedTest:
+    """The test from the first row of its path on."""
+    start = test.shear.size - path.shear.size
+    opening = test.opening[start:] - test.opening[start]
+    return SimulatedTest(path.shear, test.stress[start:], opening, path.points)
+
+
+def _simulate(law: JointLaw, paths: Sequence[ShearPath]) -> list[SimulatedTest]:
+    """Simulate paths from the unloaded joint. Raises ValueError as `simulate_shear`."""
     rows = max(path.shear.size for path in paths)
     shear = np.stack([_padded(path.shear, rows) for path in paths], -1)
     normal = np.stack([_padded(path.normal, rows) for path in paths], -1)

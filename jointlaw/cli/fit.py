@@ -34,7 +34,15 @@ from .command import (
 
 MAX_SHEAR_POINTS = 60  # per shear test: a logger writes thousands, and each costs a step
 SAME_STRESS = 0.02  # relative difference of normal stresses that --fit takes as equal
-CLOSURE_OPTIONS = ("stress_column", "closure_column", "cycle", "noise", "compliance", "up_to")
+CLOSURE_OPTIONS = (
+    "stress_column",
+    "closure_column",
+    "closure_area",
+    "cycle",
+    "noise",
+    "compliance",
+    "up_to",
+)
 SHEAR_OPTIONS = (
     "shear_column",
     "shear_stress_column",
@@ -149,9 +157,15 @@ def _read_closure(options: argparse.Namespace) -> tuple[list[ClosureCurve], Held
         return [], None
     item = options.data[0]
     notes: list[str] = []
+    source = "data set of the package"
     if Path(item).exists():
-        stress, closure, notes = datasets.read_closure(
-            item, options.stress_column, options.closure_column, options.decimal, options.outliers
+        stress, closure, notes, source = datasets.read_closure(
+            item,
+            options.stress_column,
+            options.closure_column,
+            options.decimal,
+            options.outliers,
+            options.closure_area,
         )
     elif item in datasets.names():
         stress, closure = datasets.load(item)
@@ -176,6 +190,7 @@ def _read_closure(options: argparse.Namespace) -> tuple[list[ClosureCurve], Held
         options.compliance,
         item,
         tuple(notes),
+        source,
     )
     if is_fitted.all():
         return [curve], None
@@ -326,6 +341,12 @@ _CLOSURE = Group(
         option("--stress-column", metavar="NAME:UNIT", help="normal stress, such as sigmaZ:MPa"),
         option("--closure-column", metavar="NAME:UNIT", help="closure, such as Disp:mm"),
         option(
+            "--closure-area",
+            metavar="AREA",
+            type=quantity("m2", positive=True),
+            help="area of the joint, for a closure test with a force, such as 100cm2",
+        ),
+        option(
             "--up-to",
             metavar="STRESS",
             type=quantity("Pa", positive=True),
@@ -379,8 +400,9 @@ _SHEAR = Group(
         option("--normal-column", metavar="NAME:UNIT", help="normal stress, such as sn:MPa"),
         option(
             "--opening-column",
-            metavar="NAME:UNIT",
-            help="normal displacement, opening positive, such as dn:mm",
+            metavar="NAMES:UNIT",
+            help="normal displacement, opening positive, such as dn:mm; of several gauges, such as "
+            "A,B,C,D:mm, the mean is taken",
         ),
         option(
             "--area",

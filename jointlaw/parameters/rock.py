@@ -47,6 +47,13 @@ RANGES = {
         "",
         "are both in the units that were read or given?",
     ),
+    # dilation at 79 degrees throughout
+    "opening over shear displacement": (
+        0.0,
+        STEEPEST,
+        "",
+        "are both in the units that were read or given?",
+    ),
     "plane": (-2 * math.pi, 2 * math.pi, " rad", "90 degrees is 1.571 rad"),
 }
 

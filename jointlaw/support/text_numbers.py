@@ -1,7 +1,8 @@
 """Numbers in text files of laboratories: separators, decimal marks and thousands marks.
 
 - Encoding: UTF-16 if the file begins with its byte order mark, else UTF-8, else Latin-1 (Windows).
-- Lines that are empty or begin with # are skipped; a line such as sep=; names the separator.
+- Lines that begin with #, or have no letter or digit, are skipped; a line such as sep=; names the
+  separator.
 - Otherwise the separator is a semicolon, tab or comma, the first of these in the line of names;
   or blanks.
 - The decimal mark is the one that any number shows: 0,25 and 1.201,5 show a comma, 0.25 and 1,201.5
@@ -25,8 +26,9 @@ AMBIGUITY_REMEDY = (
 )
 SWAP_MARKS = str.maketrans(",.", ".,")
 AMBIGUOUS_NUMBER = re.compile(r"[-+−]?[1-9]\d{0,2}[.,]\d{3}")
+_FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d+$)")
 _GROUPED = re.compile(r"(?<=\d)['’ \u00a0\u202f\u2009](?=\d{3}(?!\d))")
-_NUMBER = re.compile(r"[-+−]?[\d.'’]*\d[.]?(?:[eE][-+]?\d+)?")  # between commas and blanks
+_NUMBER = re.compile(r"[-+−]?[\d.'’]*\d[.]?(?:[eEdD][-+]?\d+)?")  # between commas and blanks
 _SEPARATORS = ";\t,"
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")  # where a point is decimal
 # m: the decimal mark; g: the mark between thousands
@@ -54,6 +56,7 @@ class NumberFormat(NamedTuple):
         if self.decimal is None and AMBIGUOUS_NUMBER.fullmatch(text):
             return np.nan
         text = text.translate(SWAP_MARKS) if self.decimal == "," else text
+        text = _FORTRAN_EXPONENT.sub("e", text)
         if self.grouped and _THOUSANDS.fullmatch(text):
             text = text.replace(",", "")
         try:
@@ -104,7 +107,7 @@ def read_lines(path: Path) -> dict[int, str]:
     return {
         number: line
         for number, line in enumerate(text.replace("\0", "").splitlines(), 1)
-        if line.strip(" \t,;") and not line.lstrip().startswith("#")
+        if any(map(str.isalnum, line)) and not line.lstrip().startswith("#")
     }
 
 

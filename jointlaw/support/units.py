@@ -11,7 +11,8 @@ _PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "
            "k": 1e3, "M": 1e6, "G": 1e9}  # fmt: skip
 _M, _N, _PA = ({f"{prefix}{unit}": x for prefix, x in _PREFIX.items()} for unit in ("m", "N", "Pa"))
 _STRESS = _PA | {
-    "N/mm2": 1e6, "N/mm²": 1e6, "MN/m2": 1e6, "MN/m²": 1e6, "kN/m2": 1e3, "kN/m²": 1e3, "bar": 1e5,
+    "N/mm2": 1e6, "MN/m2": 1e6, "kN/m2": 1e3, "N/m2": 1.0, "N/cm2": 1e4, "kN/cm2": 1e7,
+    "bar": 1e5, "mbar": 1e2,
 }  # fmt: skip
 _FACTORS = {  # SI units in each unit
     "Pa": _STRESS,
@@ -19,10 +20,9 @@ _FACTORS = {  # SI units in each unit
     "Pa/m": {f"{over}/{under}": x / y for over, x in _STRESS.items() for under, y in _M.items()},
     "rad": {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180},
     "N": _N,
-    "m2": {"m2": 1.0, "m²": 1.0, "cm2": 1e-4, "cm²": 1e-4, "mm2": 1e-6, "mm²": 1e-6},
+    "m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
     "m3/s": {
         "m3/s": 1.0,
-        "m³/s": 1.0,
         "l/s": 1e-3,
         "ml/s": 1e-6,
         "l/min": 1e-3 / 60,
@@ -30,6 +30,19 @@ _FACTORS = {  # SI units in each unit
     },
     "Pas": {"Pas": 1.0, "mPas": 1e-3},
 }
+# of units that `parse` refuses: a quantity of the same size, as a remedy in messages
+OTHER_UNITS = {
+    "in": "25.4mm", "inch": "25.4mm", "inches": "25.4mm", '"': "25.4mm", "ft": "304.8mm",
+    "mil": "25.4um", "mils": "25.4um", "thou": "25.4um",
+    "psi": "6.894757kPa", "ksi": "6.894757MPa", "psf": "47.88026Pa", "tsf": "95.76052kPa",
+    "kgf/cm2": "98.0665kPa", "kg/cm2": "98.0665kPa", "kp/cm2": "98.0665kPa", "at": "98.0665kPa",
+    "kgf/mm2": "9.80665MPa", "kg/mm2": "9.80665MPa", "atm": "101.325kPa",
+    "t/m2": "9.80665kPa", "tf/m2": "9.80665kPa", "daN/cm2": "100kPa",
+    "lbf": "4.448222N", "lb": "4.448222N", "lbs": "4.448222N", "kip": "4.448222kN",
+    "kips": "4.448222kN", "kgf": "9.80665N", "kp": "9.80665N", "kg": "9.80665N",
+    "tf": "9.80665kN", "daN": "10N",
+}  # fmt: skip
+_EXPONENTS = str.maketrans("²³", "23", "^*")
 _PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
 
@@ -42,11 +55,17 @@ def parse(text: str, unit: str) -> float:
     Raises ValueError naming the text, the unit and an example.
     """
     number, given_unit = _split(text)
-    if number and (given_unit or unit) in _FACTORS[unit]:
-        return float(number) * _FACTORS[unit][given_unit or unit]
+    factor = _FACTORS[unit].get(plain_exponents(given_unit or unit))
+    if number and factor is not None:
+        return float(number) * factor
     raise ValueError(
         f"{text!r} is not a quantity in {unit}; write a number in {unit} or 10{COMMON[unit]}"
     )
+
+
+def plain_exponents(unit: str) -> str:
+    """A unit with its exponents as digits: N/mm2 for N/mm², N/mm^2 and N/mm**2."""
+    return unit.translate(_EXPONENTS)
 
 
 def _split(text: str) -> tuple[str, str]:

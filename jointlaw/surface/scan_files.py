@@ -124,6 +124,12 @@ def _read_text(path: Path, decimal: str | None) -> tuple[Array, float | None]:
     if marks.decimal == ",":
         lines = [line.translate(SWAP_MARKS) for line in lines]
     z = np.loadtxt(lines, delimiter=mark, ndmin=2)
+    for name, size in zip(("nrows", "ncols"), z.shape, strict=True):
+        stated = marks.value(header[name][0]) if header.get(name) else size
+        if stated != size:
+            raise ValueError(
+                f"it has {size} {name[1:]}, its header says {stated:g}: it is not whole"
+            )
     if "nodata_value" in header:
         z[z == marks.value(header["nodata_value"][0])] = np.nan
     spacings = {name: marks.value(header[name][0]) for name in _SPACING_KEYS if name in header}

@@ -95,8 +95,9 @@ def test_readable_files(name, encoding, tmp_path):
 
 def test_closure_file(tmp_path):
     text = "Disp;sigmaZ\n/mm;/kPa\n" + rows(U, 1e3 * U, mark=";")
-    stress, closure, notes = read(tmp_path, text, read_closure)
+    stress, closure, notes, source = read(tmp_path, text, read_closure)
     assert not notes
+    assert source == "sigmaZ is load, Disp is closure"
     np.testing.assert_allclose(closure, 1e-3 * U)
     np.testing.assert_allclose(stress, 1e6 * U)
     assert all(load(name)[0].max() > 1e6 for name in names())
@@ -459,8 +460,8 @@ def test_decimal_commas_are_read_if_a_number_or_the_caller_shows_them(
         (rows(U, TAU), "must hold a line of names with units"),
         ("us [mm],tau [MPa]\n1,2\n2,\n3,\n", "has 1 rows with all numbers; give 3 or more"),
         ("us [mm],us [mm],tau [MPa]\n1,2,3\n2,3,4\n3,4,5\n", "has 2 columns of one name"),
-        ("us [mm],tau [MPa]\n0,0\n1,2\n2,inf\n", "line 4 holds 'inf', which is no number"),
-        ("us [mm],tau\n" + rows(U, TAU), 'gives no unit; name it, .* "tau:MPa"'),
+        ("us [mm],tau [MPa]\n0,0\n1,2\n2,inf\n", r"line 4: tau .MPa. is 'inf'.*--outliers skip"),
+        ("us [mm],tau\n" + rows(U, TAU), 'gives no unit; give the unit that .* "tau:MPa"'),
         ("us [mm],tau [psi]\n" + rows(U, TAU), "has the unit 'psi', none of Pa"),
         ("us [mm],tau [MPa]\n" + rows(U, TAU, decimal=","), "has 4 cells .* columns by semicolons"),
         ("us [mm];tau [MPa]\n1;2;3\n2;3;4\n", "has 3 cells under 2 names; give each column a name"),
@@ -472,3 +473,280 @@ def test_unreadable_files_are_refused(text, message, tmp_path):
         (tmp_path / "lab.csv").write_text(text)
     with pytest.raises(ValueError, match=message):
         read_shear(tmp_path / "lab.csv", **NORMAL)
+
+
+# ------------------------------------------------- kinds of files of loggers and spreadsheets
+
+N = np.arange(12)
+LONG_U = np.round(0.25 * N, 3)  # mm
+LONG_TAU = np.round(1.8 * (1 - np.exp(-LONG_U / 0.3)), 4)  # MPa
+LONG_DN = np.round(0.1 * LONG_U + 0.002, 4)  # mm
+NAMES = "us [mm],tau [MPa],sn [MPa],dn [mm]\n"
+
+
+def long_table(u=LONG_U, tau=LONG_TAU, dn=LONG_DN, normal=2.0):
+    return rows(u, tau, np.broadcast_to(normal, np.shape(u)), dn) + "\n"
+
+
+def assert_long_test(test):
+    np.testing.assert_allclose(test.shear, 1e-3 * LONG_U, atol=1e-15)
+    np.testing.assert_allclose(test.shear_stress, 1e6 * LONG_TAU)
+    np.testing.assert_allclose(test.opening, 1e-3 * (LONG_DN - LONG_DN[0]), atol=1e-15)
+    assert test.normal == pytest.approx(2e6)
+
+
+def with_column(title, unit="", cells=N, last=False):
+    """A table with one column more, and its units in a row below the names if `unit` is given."""
+    table = [line.split(",") for line in long_table().split()]
+    names = NAMES.strip().split(",")
+    head = [[name.split()[0] for name in names], ["mm", "MPa", "MPa", "mm"]] if unit else [names]
+    more = [[title, unit] if unit else [title], [str(cell) for cell in cells]]
+    lines = []
+    for row, cell in zip([*head, *table], [*more[0], *more[1]], strict=True):
+        lines.append(";".join([*row, cell] if last else [cell, *row]))
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("last", [False, True])
+@pytest.mark.parametrize(
+    "unit",
+    [
+        "s", "sec", "min", "h", "°C", "C", "deg C", "V", "mV/V", "%", "-", "mm/min", "hh:mm:ss",
+        "Hz", "kN/s", "[s]", "mm",
+    ],
+)  # fmt: skip
+def test_row_of_units_with_a_column_of_another_kind(unit, last, tmp_path):
+    (test,) = read(tmp_path, with_column("other", unit, last=last))
+    assert_long_test(test)
+
+
+def test_row_of_units_above_the_names(tmp_path):
+    text = "mm;MPa;MPa;mm\nus;tau;sn;dn\n" + long_table().replace(",", ";")
+    assert_long_test(*read(tmp_path, text))
+
+
+def test_index_column_without_a_name(tmp_path):
+    """As pandas writes it."""
+    assert_long_test(*read(tmp_path, with_column("").replace(";", ",")))
+
+
+@pytest.mark.parametrize(
+    ("stress", "factor"),
+    [
+        ("N/mm^2", 1), ("N/mm²", 1), ("MN/m2", 1), ("kN/m^2", 1e3), ("N/cm2", 100), ("MPA", 1),
+        ("KPA", 1e3), ("mbar", 1e4), ("МПа", 1), ("Mpa.", 1),
+    ],
+)  # fmt: skip
+def test_spellings_of_units(stress, factor, tmp_path):
+    names = NAMES.replace("MPa", stress).replace("[mm]", "[MM]", 1)
+    table = long_table(tau=factor * LONG_TAU, normal=2.0 * factor)
+    assert_long_test(*read(tmp_path, names + table))
+
+
+def test_names_and_units_in_capitals_and_full_width_brackets(tmp_path):
+    names = "SHEAR_DISP_MM,SHEAR_STRESS_MPA,NORMAL_STRESS_MPA,DILATION（mm）\n"
+    assert_long_test(*read(tmp_path, names + long_table()))
+
+
+def test_exponents_of_fortran(tmp_path):
+    table = ["  ".join(f"{x:.6E}" for x in row) for row in zip(LONG_U, LONG_TAU, strict=True)]
+    text = "us[mm] tau[MPa]\n" + "\n".join(table).replace("E", "D")
+    (test,) = read(tmp_path, text, **NORMAL)
+    np.testing.assert_allclose(test.shear_stress, 1e6 * LONG_TAU)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "option"),
+    [
+        ("psi", 6894.757, "tau:6.894757kPa"),
+        ("kgf/cm2", 98066.5, "tau:98.0665kPa"),
+        ("t/m^2", 9806.65, "tau:9.80665kPa"),
+        ("kgf", None, None),
+        ("zoll", None, None),
+    ],
+)
+def test_remedy_for_an_unknown_unit_reads_right(unit, size, option, tmp_path):
+    """The message gives the size of the unit, or nothing, and never another unit."""
+    text = f"us [mm],tau [{unit}]\n" + rows(LONG_U, 1e6 * LONG_TAU / (size or 1e6))
+    with pytest.raises(ValueError, match="none of Pa; ") as error:
+        read(tmp_path, text, **NORMAL)
+    written = re.findall(r'--shear-stress-column "(.*)"', str(error.value))
+    assert written == ([option] if option else [])
+    for one in written:
+        (test,) = read(tmp_path, text, **NORMAL, stress=one)
+        np.testing.assert_allclose(test.shear_stress, 1e6 * LONG_TAU, rtol=1e-6)
+    if size:
+        with pytest.raises(ValueError, match=r"the option names 'MPa'; write .*file$"):
+            read(tmp_path, text, **NORMAL, stress="tau:MPa")
+
+
+@pytest.mark.parametrize(
+    "reader_and_text",
+    [
+        "Results Table 1\nSpecimen label,K3\nArea,100,cm2\n\n"
+        'Time,us,tau,sn,dn\n(s),(mm),(MPa),(MPa),(mm)\n"{rows}',
+        "Projekt;Tunnel Nord\nDurchmesser;100,0;mm\nDatum;01.05.2024\n\n"
+        "Zeit;Scherweg;Scherspannung;Normalspannung;Vertikalweg\ns;mm;N/mm²;N/mm²;mm\n{rows}",
+        "LabVIEW Measurement\t\nWriter_Version\t2\nDecimal_Separator\t.\n***End_of_Header***\t\n"
+        "\t\nChannels\t4\t\t\t\nSamples\t12\t12\t12\t12\nX0\t0.0\t0.0\t0.0\t0.0\n"
+        "Delta_X\t1\t1\t1\t1\n***End_of_Header***\t\t\t\t\n"
+        "X_Value\tus [mm]\ttau [MPa]\tsn [MPa]\tdn [mm]\tComment\n{rows}",
+    ],
+    ids=["Instron", "Wille", "LabVIEW"],
+)
+def test_header_of_a_testing_machine(reader_and_text, tmp_path):
+    """With values, and lines of several numbers, above the names."""
+    mark = next(mark for mark in "\t;," if mark in reader_and_text)
+    table = rows(N, LONG_U, LONG_TAU, 0 * LONG_U + 2, LONG_DN, mark=mark)
+    if mark == ";":
+        table = table.replace(".", ",")
+    text = reader_and_text.replace('"{', "{").replace("{rows}", table)
+    assert_long_test(*read(tmp_path, text))
+
+
+REFUSED_ROWS = {  # rows that are no measurement: text, reason, number of rows
+    "repeated rows": (
+        NAMES + long_table() + "\n".join(long_table().splitlines()[-4:]) + "\n",
+        "line 14: repeats line 10; line 15: repeats line 11", 4,
+    ),
+    "a summary under remarks": (
+        with_column("Remark", cells=[""] * 12, last=True) + "\n3;1.8;2;0.3;Max\n1;1;2;0.1;Mean",
+        "line 14: Remark is 'Max'; line 15: Remark is 'Mean'", 2,
+    ),
+    "a summary in the first column": (
+        NAMES + long_table() + "Max,1.8,2,0.3\n", "line 14: us [mm] is 'Max'", 1,
+    ),
+    "an error": (
+        NAMES + long_table() + "2.9,#DIV/0!,2,0.3\n", "line 14: tau [MPa] is '#DIV/0!'", 1,
+    ),
+    "an overflow": (NAMES + long_table() + "2.9,OL,2,0.3\n", "line 14: tau [MPa] is 'OL'", 1),
+    "a line cut by a power failure": (
+        with_column("n", cells=[f"{k}.000" for k in N], last=True) + "\n3;1.8;2;0.3;12.0",
+        "line 14: n is '12.0', cut short", 1,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", REFUSED_ROWS)
+def test_rows_that_are_no_measurement(kind, tmp_path):
+    text, reason, count = REFUSED_ROWS[kind]
+    with pytest.raises(ValueError, match=re.escape(reason) + r".* Write --outliers skip to leave"):
+        read(tmp_path, text)
+    (test,) = read(tmp_path, text, outliers="skip")
+    assert_long_test(test)
+    assert f"{count} rows are left out as outliers ({reason}" in test.notes[0]
+    if "is '#" in reason or "is 'OL" in reason or "[mm] is 'M" in reason:
+        with pytest.raises(ValueError, match="which is no number: it cannot be kept"):
+            read(tmp_path, text, outliers="keep")
+    else:
+        assert read(tmp_path, text, outliers="keep")[0].shear.size == 12 + count
+
+
+def test_remark_at_the_peak_and_a_hold_are_measurements(tmp_path):
+    remarks = ["", "", "Max", *[""] * 9]
+    assert_long_test(*read(tmp_path, with_column("Remark", cells=remarks, last=True)))
+    hold = rows([0, 1, 1, 1, 1, 2], [0, 1, 1, 1, 1, 1.2])
+    assert read(tmp_path, "us [mm],tau [MPa]\n" + hold, **NORMAL)[0].shear.size == 6
+
+
+def test_second_test_without_its_names_is_refused_with_its_line(tmp_path):
+    second = long_table(tau=2 * LONG_TAU, normal=4.0)
+    message = r"line 14: the shear displacement returns from 2\.75 to 0 mm .*: repeat the line of"
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path, NAMES + long_table() + second)
+    tests = read(tmp_path, NAMES + long_table() + NAMES + second)
+    assert [test.normal[0] for test in tests] == [2e6, 4e6]
+
+
+def test_few_rows_of_a_cycle_are_one_test(tmp_path):
+    """Back to the start in one row, driven by a shear stress in this direction."""
+    text = "us [mm],tau [MPa]\n0,0\n1,1.8\n3,1.5\n0,-1.4\n-3,-1.4\n0,1.4\n"
+    assert read(tmp_path, text, **NORMAL)[0].shear.size == 6
+
+
+@pytest.mark.parametrize("elastic", [0.0, 0.01, 0.05])
+def test_unloading_at_the_end_is_left_out(elastic, tmp_path):
+    """The shear stress falls to a tenth while the displacement returns by at most 0.05 mm."""
+    end = LONG_U[-1] - elastic * np.array([0.3, 0.6, 1.0])
+    tail = long_table(end, LONG_TAU[-1] * np.array([0.7, 0.4, 0.1]), LONG_DN[-1] + 0 * end)
+    (test,) = read(tmp_path, NAMES + long_table() + tail)
+    assert_long_test(test)
+    assert "3 rows at the end are unloading" in test.notes[0]
+
+
+def test_strength_lost_with_displacement_is_no_unloading(tmp_path):
+    """The last rows fall to a third, but the joint slides on."""
+    tau = np.where(N < 10, LONG_TAU, 0.6)
+    assert read(tmp_path, NAMES + long_table(tau=tau))[0].shear.size == 12
+
+
+def test_record_under_load_at_zero_displacement_begins_with_this_stress(tmp_path):
+    """As before an injection: the normal stress falls, and the joint slides under its load."""
+    text = NAMES + "0,1,4,0\n0.01,1,3,0.001\n0.1,1,2,0.01\n1,0.95,1.5,0.1\n"
+    (test,) = read(tmp_path, text)
+    assert test.initial_stress == 1e6
+    assert (
+        "begins at a shear stress of 1e+02 % of the largest: the joint is loaded" in test.notes[0]
+    )
+    with pytest.raises(ValueError, match=r"begins at 18 % .* against the shear"):
+        read(tmp_path, NAMES + long_table(tau=np.where(N == 0, -0.32, LONG_TAU)))
+
+
+def test_gauges_of_one_opening(tmp_path):
+    names = "us [mm],tau [MPa],sn [MPa],A [mm],B [mm],C [um]\n"
+    offset = [0.1, -0.3, 20]
+    gauges = (LONG_DN + offset[0], 1.2 * LONG_DN + offset[1], 800 * LONG_DN + offset[2])
+    text = names + rows(LONG_U, LONG_TAU, 0 * LONG_U + 2, *gauges)
+    (alone,) = read(tmp_path, text)
+    assert alone.opening is None
+    assert "lengths that are not used: A [mm], B [mm], C [um]" in alone.notes[0]
+    (test,) = read(tmp_path, text, opening="A,B,C")
+    assert_long_test(test)
+    # 0.4 of the opening, 0.275 mm
+    assert (
+        "the mean of 3 gauges, A [mm], B [mm], C [um]; they differ by up to 0.11 mm"
+        in (test.notes[0])
+    )
+    without_units = text.replace(" [mm],B [mm],C [um]", ",B,C")
+    (pair,) = read(tmp_path, without_units, opening="A,B:mm")
+    np.testing.assert_allclose(pair.opening, 1.1e-3 * (LONG_DN - LONG_DN[0]), atol=1e-15)
+    with pytest.raises(ValueError, match=r"which column is the opening.*--opening-column"):
+        read(tmp_path, text, opening="A,D:mm")
+
+
+def test_opening_beyond_the_displacement_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"opening over shear displacement = 100 is outside"):
+        read(tmp_path, NAMES + long_table(dn=1000 * LONG_DN))
+
+
+def test_normal_stress_of_zero_is_refused_with_the_file(tmp_path):
+    names = "us [mm],sn [MPa],tau [MPa],dn [mm]\n"
+    with pytest.raises(ValueError, match=r"lab\.csv: normal stress = 0 Pa .* columns exchanged"):
+        read(tmp_path, names + long_table())
+
+
+def test_closure_test_with_a_force(tmp_path):
+    text = "Load [kN],closure [um]\n" + rows([0, 10, 20, 40, 80], [0, 20, 30, 40, 50])
+    record = read(tmp_path, text, read_closure, area=0.01)
+    np.testing.assert_allclose(record.stress, 1e6 * np.array([0, 1, 2, 4, 8]))
+    assert record.notes == ["stress is force over an area of 100 cm2"]
+    with pytest.raises(ValueError, match="has forces; give the area, --closure-area 100cm2"):
+        read(tmp_path, text, read_closure)
+    stresses = text.replace("Load [kN]", "stress [MPa]")
+    with pytest.raises(ValueError, match="has stresses, not forces: leave --closure-area out"):
+        read(tmp_path, stresses, read_closure, area=0.01)
+
+
+def test_hidden_sheets_are_noted_and_hidden_rows_refused(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    table = [TITLES, *np.column_stack([U, 1e3 * TAU, 0 * U + 2e3]).tolist()]
+    path = workbook(tmp_path / "lab.xlsx", A=table, old=table)
+    book = openpyxl.load_workbook(path)
+    book["old"].sheet_state = "hidden"
+    book.save(path)
+    (test,) = read_shear(path)
+    assert test.notes == ("sheet old is hidden: it is not read",)
+    book["A"].row_dimensions[5].hidden = True
+    book.save(path)
+    with pytest.raises(ValueError, match=r"sheet A: 1 rows are hidden, as by a filter, from row 5"):
+        read_shear(path)

@@ -48,6 +48,7 @@ RADIAL = (
     "--flow-radii 4mm,60mm"
 )
 SHEAR_FIT = "fit --shear shear.csv"
+FORCE_CLOSURE = "fit load.csv --closure-area 100cm2"
 FORCE_FIT = "fit --shear forces.csv --normal-stress 1MPa --area 100cm2"
 
 # Options of a command, each with a line without it and a line with it or with another value
@@ -74,6 +75,7 @@ PROBES = {
     "fit": {
         "data": (FILE_FIT, "fit grimsel_vd1_closure"),
         "--stress-column": (FILE_FIT, "--stress-column other:MPa"),
+        "--closure-area": (FORCE_CLOSURE, FORCE_CLOSURE.replace("100cm2", "200cm2")),
         "--closure-column": (FILE_FIT, "--closure-column second:mm"),
         "--up-to": (FILE_FIT, "--up-to 3MPa"),
         "--cycle": (FILE_FIT, "--cycle"),
@@ -308,6 +310,7 @@ FILE_TEXTS = {
     "shear.csv": SHEAR_TITLES + shear_rows(1.0),
     "other.csv": SHEAR_TITLES + shear_rows(2.0),
     "third.csv": SHEAR_TITLES + shear_rows(3.0),
+    "load.csv": "load_kN,closure_mm\n" + rows(10 * CLOSURE_TEST[:, 0], CLOSURE_TEST[:, 1]),
     "forces.csv": "shear_mm,shear_force_kN\n" + rows(2 * START, 9 * START**0.3),
     "flow.csv": "stress_MPa,aperture_mm,other\n"
     + rows(5 * RAMP**2, 0.05 - 0.02 * RAMP, 0.06 - 0.02 * RAMP),

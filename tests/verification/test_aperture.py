@@ -289,7 +289,7 @@ def test_measured_flow_on_unloading_follows_closure(specimen, tmp_path):
 def test_a_law_fitted_to_loading_alone_does_not_predict_unloading(specimen, at_largest, unloading):
     """As far off as Bandis' form: without plastic indentation the joint opens again."""
     compliance = 2e-12
-    stress, closure, _ = read_closure(DATA / f"grimsel_{specimen}_closure.csv")
+    stress, closure, *_ = read_closure(DATA / f"grimsel_{specimen}_closure.csv")
     curve = jl.ClosureCurve(*first_loading(stress, closure), compliance=compliance)
     test = read_flow(DATA / f"grimsel_flow_{specimen}.csv", CONDITIONS)
     errors = fit_flow(test, jl.fit_curves([curve]).law, 5.3e6).errors["map of the law's closure"]

@@ -161,6 +161,45 @@ def test_peak_of_a_test():
     assert reversed_peak.displacement == pytest.approx(1.1e-3)
 
 
+def test_record_that_begins_under_shear_stress(law):
+    """A joint under 1.2 MPa of shear and 4 MPa of normal stress slides while the normal stress
+    falls, as in an injection: the record from there on is predicted from there on.
+    """
+    law = replace(law, mating_length=2e-3, plane=0.0, resolution=jl.Resolution(10, 8, 24))
+    loading = np.linspace(0.0, 6e-6, 300)
+    whole = ShearCurve(loading, np.ones(300), 4e6)
+    stress, _ = whole.predict(law, 200)
+    start = float(np.interp(1.2e6, stress, loading))
+    slip = np.linspace(0.0, 2e-4, 60)
+    normal = 4e6 * np.exp(-slip / 1e-4)
+    shear = np.concatenate([loading[loading < start], start + slip])
+    normals = np.concatenate([np.full(shear.size - 60, 4e6), normal])
+    exact = ShearCurve(shear, np.ones(shear.size), normals).predict(law, 200)
+    exact_stress, exact_opening = (column[-60:] for column in exact)
+    begins = {"normal": normal, "initial_stress": 1.2e6}
+    record = ShearCurve(slip, np.append(1.2e6, np.ones(59)), **begins)
+    stress, opening = record.predict(law, 200)
+    # 1 %: the steps of the loading
+    np.testing.assert_allclose(stress, exact_stress, atol=0.01 * exact_stress.max())
+    np.testing.assert_allclose(opening, exact_opening - exact_opening[0], atol=2e-7)
+    unloaded, _ = ShearCurve(slip, np.ones(60), normal).predict(law, 200)
+    assert abs(unloaded[1] - exact_stress[1]) > 0.1e6
+    with pytest.raises(
+        ValueError, match="initial_stress = 1e\\+06 Pa, but the record begins at 1 Pa"
+    ):
+        ShearCurve(slip, np.ones(60), normal, initial_stress=1e6)
+
+
+def test_initial_shear_stress_beyond_the_strength_begins_at_the_peak(law):
+    law = replace(law, mating_length=2e-4, plane=0.0)
+    slip = np.linspace(0.0, 1e-3, 40)
+    strength = ShearCurve(slip, np.ones(40), 3e6).predict(law, 100)[0].max()
+    record = ShearCurve(slip, np.append(1e8, np.ones(39)), 3e6, initial_stress=1e8)
+    stress, _ = record.predict(law, 100)
+    assert stress[0] == pytest.approx(strength, rel=0.01)
+    assert np.all(np.diff(stress) < 0.01 * strength)
+
+
 def test_resampled_rows_are_evenly_spaced_along_the_curve():
     """1001 noisy rows with a peak at 0.5 mm of 10 mm: even rows would leave three before it."""
     shear = np.linspace(0.0, 1e-2, 1001)

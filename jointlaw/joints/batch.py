@@ -235,7 +235,11 @@ class JointBatch:
 
     @property
     def F(self) -> Array:
-        """Traction (n, dim) in Pa."""
+        """Traction (n, dim) in Pa of the present states, without a step.
+
+        A zero increment of `update` is not neutral if asperities degrade: their degradation lags
+        one step behind the work of shear.
+        """
         return self._engine.evaluate("traction", self._state, self._n)
 
     @property

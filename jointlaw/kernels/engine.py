@@ -207,9 +207,9 @@ class NativeEngine:
         self._run(library.REFRESH, self._prepare_call(state, n))
 
     def evaluate(self, quantity: str, state: Array, n: int) -> Array:
-        """As `NumpyEngine.evaluate`; the traction is from a zero increment."""
+        """As `NumpyEngine.evaluate`; the traction is bitwise the traction of the last step."""
         operation, *shape = {
-            "traction": (library.ADVANCE, n, self._law.dim),
+            "traction": (library.TRACTION, n, self._law.dim),
             "stiffness": (library.STIFFNESS, n),
             "measures": (library.MEASURE, n, 5),
         }[quantity]

@@ -67,7 +67,7 @@ static void advance_block(const jlaw_batch *b, double *block, size_t next_offset
                           int count)
 {
   const int dim = b->law->dim, curve_stored = b->rows > jl_state_rows(b->law);
-  const double *d = b->d ? b->d + first * dim : NULL;
+  const double *d = b->d + first * dim;
   double *F = b->F + first * dim, *C = b->C ? b->C + first * dim * dim : NULL;
   for (int at = 0; at < count; at += JL_JOINTS_PER_PASS) {
     const jl_states n = {block + at, BLOCK, next_offset};
@@ -75,7 +75,7 @@ static void advance_block(const jlaw_batch *b, double *block, size_t next_offset
     const int lanes = count - at < JL_JOINTS_PER_PASS ? count - at : JL_JOINTS_PER_PASS;
     for (int i = 0; i < dim; i++) {
       p[i] = jl_broadcast_joint(0.0);
-      for (int l = 0; d && l < lanes; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
+      for (int l = 0; l < lanes; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
     }
     jl_measures measures;
     jl_step_of_kind(b->law, n, p, f, c, b->track_dissipation, C != NULL, curve_stored,
@@ -97,7 +97,7 @@ static double *state_of(const jlaw_batch *b, long long joint)
 }
 
 /* Advance entries first to last - 1 of b->index, or of all joints if it is NULL; `first` is a
- * multiple of BLOCK. Without b->commit, as always without b->d, no state changes. Returns 0, or -1
+ * multiple of BLOCK. Without b->commit no state changes. Returns 0, or -1
  * if no memory is left. */
 static int advance(const jlaw_batch *b, long first, long last)
 {
@@ -117,8 +117,6 @@ static int advance(const jlaw_batch *b, long first, long last)
       }
     else if (!b->commit) memcpy(copy, state_of(b, start), size * sizeof *copy);
     else block = state_of(b, start);
-    for (int l = 0; !b->d && b->law->degrades && l < BLOCK; l++) /* no shear work: no degradation */
-      copy[(size_t) (jl_degradation_row(b->law) + 1) * BLOCK + (size_t) l] = 0.0;
     advance_block(b, block, copy ? 0 : size, start, count);
     if (b->index && b->commit)
       for (int l = 0; l < count; l++) {
@@ -141,6 +139,21 @@ static int measure(const jlaw_batch *b, long first, long last)
     for (int i = 0; i < 5; i++)
       for (int l = 0; l < JL_JOINTS_PER_PASS && at + l < last; l++)
         b->F[5 * (at + l) + i] = JL_JOINT(out[i], l);
+  }
+  return 0;
+}
+
+/* Tractions (n, dim) of joints first to last - 1 in their present states, into b->F */
+static int traction(const jlaw_batch *b, long first, long last)
+{
+  const int dim = b->law->dim;
+  for (long at = first; at < last; at += JL_JOINTS_PER_PASS) {
+    const jl_states n = {state_of(b, at), BLOCK, 0};
+    jl_joint_real F[3];
+    jl_traction(b->law, n, F);
+    for (int i = 0; i < dim; i++)
+      for (int l = 0; l < JL_JOINTS_PER_PASS && at + l < last; l++)
+        b->F[dim * (at + l) + i] = JL_JOINT(F[i], l);
   }
   return 0;
 }
@@ -177,5 +190,5 @@ static int refresh(const jlaw_batch *b, long first, long last)
   return 0;
 }
 
-extern jlaw_call *const NAME(jlaw_calls)[4];
-jlaw_call *const NAME(jlaw_calls)[4] = {advance, measure, refresh, stiffness};
+extern jlaw_call *const NAME(jlaw_calls)[JLAW_OPERATIONS];
+jlaw_call *const NAME(jlaw_calls)[JLAW_OPERATIONS] = {advance, measure, refresh, stiffness, traction};

@@ -10,6 +10,8 @@ typedef struct jlaw_law jlaw_law;
 
 enum { JLAW_JOINTS_PER_BLOCK = 8 /* side by side in a block of states */ };
 
+enum { JLAW_OPERATIONS = 5 /* of jlaw_run: advance, measure, refresh, stiffness, traction */ };
+
 enum { /* measures of a joint after a step: fractions, J/m2, damage; its displacement follows them */
        JLAW_SLIDING,
        JLAW_SLIPPING,
@@ -23,7 +25,7 @@ enum { /* measures of a joint after a step: fractions, J/m2, damage; its displac
 typedef struct {
   const jlaw_law *law;
   double *state;          /* (blocks, rows, JLAW_JOINTS_PER_BLOCK), or (n, rows) if contiguous */
-  const double *d;        /* (n, dim); NULL: a zero increment, before asperities degrade */
+  const double *d;        /* (n, dim) */
   double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
   double *measures;       /* (n, JLAW_MEASURES + dim) after the step, or NULL */
   const long long *index; /* (n,): the joints to advance; NULL: all */

@@ -135,6 +135,28 @@ JL_INLINE jl_joint_real jl_step_elements(const jlaw_law *law, jl_states n, int r
   return stored;
 }
 
+/* Add the traction of the elements in their present states, at the displacement delta, to F */
+JL_INLINE void jl_add_element_traction(const jlaw_law *law, jl_states n, int row,
+                                       const jl_joint_real delta[3], jl_joint_real F[3])
+{
+  const int dim = law->dim;
+  for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+    const double *rows = JL_STATE_OF_LANE(n, l) + (size_t) row * n.stride;
+#define JL_ADD_TRACTION(name)                                                                 \
+  if (law->name) {                                                                            \
+    const int count = jl_##name##_rows(law);                                                  \
+    jl_element_step p; /* entries that a step does not write are not read */                  \
+    for (int i = 0; i < 3; i++) p.from[i] = i < dim ? JL_JOINT(delta[i], l) : 0.0, p.d[i] = 0.0; \
+    for (int i = 0; i < count; i++) p.row[i] = rows[(size_t) i * n.stride];                   \
+    jl_##name##_step(law, &p, 0);                                                             \
+    for (int i = 0; i < dim; i++) JL_JOINT(F[i], l) += p.F[i];                                \
+    rows += (size_t) count * n.stride;                                                        \
+  }
+    JLAW_ELEMENTS(JL_ADD_TRACTION)
+#undef JL_ADD_TRACTION
+  }
+}
+
 /* Upper bound of |C| (Pa/m) of the elements in the state s, or in all states if s is NULL */
 JL_INLINE double jl_elements_stiffness_bound(const jlaw_law *law, const double *s, int row,
                                              size_t stride)

@@ -87,6 +87,11 @@ JLAW_FUNCTION void jlaw_break_bond(const jlaw_law *law, double *s);
 JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
                              double *F, double *C);
 
+/* Traction F (dim) in Pa of a state, without a step: bitwise the traction of the step that wrote it. A
+ * step by d = 0 is not neutral if asperities degrade, since degradation lags one step. Use this function
+ * for the forces at the start of a run and for output. The state must be valid for this law. */
+JLAW_FUNCTION void jlaw_traction(const jlaw_law *law, const double *state, double *F);
+
 /* Elastic energy, and energy dissipated since the virgin state, J/m2 */
 JLAW_FUNCTION double jlaw_stored_energy(const jlaw_law *law, const double *s);
 JLAW_FUNCTION double jlaw_dissipated_energy(const jlaw_law *law, const double *s);
@@ -451,6 +456,12 @@ JLAW_MULTIVERSIONED static JLAW_FUNCTION jl_measures jlaw_measure_(const jlaw_la
 {
   const jl_states n = {(double *) s, 1, 0}; /* only read */
   return jl_measure(law, n);
+}
+
+JLAW_MULTIVERSIONED JLAW_FUNCTION void jlaw_traction(const jlaw_law *law, const double *s, double *F)
+{
+  const jl_states n = {(double *) s, 1, 0}; /* only read */
+  jl_traction(law, n, F);
 }
 
 JLAW_FUNCTION double jlaw_stored_energy(const jlaw_law *law, const double *s)

@@ -369,6 +369,26 @@ JL_INLINE void jl_facet_traction(const jlaw_law *law, const double *f, const jl_
   jl_to_joint_axes(f, &F[1], &F[2]);
 }
 
+/* Add the traction of facets with this normal force over A, and sums q of slider forces over lam, to F
+ * (dim). s: the planes of the facets, if the interlock decays */
+JL_INLINE void jl_add_facet_traction(const jlaw_law *law, const double *f, const jl_plane *s,
+                                     jl_real force, jl_real qs, jl_real qt, int dim,
+                                     int interlock_decays, jl_real F[3])
+{
+  if (interlock_decays) {
+    jl_real traction[3];
+    jl_facet_traction(law, f, s, force, qs, qt, traction);
+    for (int i = 0; i < dim; i++) F[i] += traction[i];
+    return;
+  }
+  const jl_real normal = jl_column(f, JLAW_A) * force;
+  qs = law->stiffness_ratio * qs, qt = law->stiffness_ratio * qt;
+  for (int i = 0; i < dim; i++) {
+    const jl_real normal_i = jl_column(f, JLAW_N + i) * normal;
+    F[i] += normal_i + (jl_column(f, JLAW_S + i) * qs + jl_column(f, JLAW_T + i) * qt);
+  }
+}
+
 /* ------------------------------------------------------------- asperity degradation */
 
 /* Slope retention before the step and after degradation by the shear work done so far */
@@ -773,20 +793,10 @@ JL_INLINE void jl_step_facets(const jlaw_law *law, int at, const jl_joint_step *
     jl_facet_traction(law, f, &start, o.f0, o.us, o.ut, F);
     sum->shear0[0] += F[1], sum->shear0[1] += F[2];
   }
-  if (k.interlock_decays) {
-    jl_real F[3];
-    jl_facet_traction(law, f, &o.end, o.f1, o.qs, o.qt, F);
-    for (int i = 0; i < k.dim; i++) sum->F[i] += F[i];
-    if (k.tangent) jl_add_decaying_tangent(law, f, m, &o, sum, k);
-    return;
-  }
-  const jl_real normal = jl_column(f, JLAW_A) * o.f1, qs = law->stiffness_ratio * o.qs,
-                qt = law->stiffness_ratio * o.qt;
-  for (int i = 0; i < k.dim; i++) {
-    const jl_real normal_i = jl_column(f, JLAW_N + i) * normal;
-    sum->F[i] += normal_i + (jl_column(f, JLAW_S + i) * qs + jl_column(f, JLAW_T + i) * qt);
-  }
-  if (k.tangent) jl_add_tangent(law, f, &o, sum, k);
+  jl_add_facet_traction(law, f, &o.end, o.f1, o.qs, o.qt, k.dim, k.interlock_decays, sum->F);
+  if (!k.tangent) return;
+  if (k.interlock_decays) jl_add_decaying_tangent(law, f, m, &o, sum, k);
+  else jl_add_tangent(law, f, &o, sum, k);
 }
 
 /* Measures of joints from the partial sums over their facets */
@@ -932,6 +942,41 @@ JL_INLINE jl_measures jl_measure(const jlaw_law *law, jl_states n)
       jl_step_elements(law, n, jl_element_row(law), delta, zero, NULL, NULL, 0, 0);
   jl_add_element_measures(law, n, stored, &all);
   return all;
+}
+
+/* Traction F (dim) of joints in their present states, bitwise equal to the traction of the step that
+ * wrote them: facets and cells are summed in the same order */
+JL_INLINE void jl_traction(const jlaw_law *law, jl_states n, jl_joint_real F[3])
+{
+  const int dim = law->dim, M = law->facets, D = law->cells;
+  struct {
+    jl_real F[3];
+  } sum[JL_PARTIAL_SUMS];
+  jl_joint_real delta[3], slopes = jl_broadcast_joint(1.0);
+  for (int i = 0; i < 3; i++)
+    delta[i] = i < dim ? jl_load_joint(n, i) : jl_broadcast_joint(0.0);
+  if (law->degrades) slopes = 1.0 - jl_load_joint(n, jl_degradation_row(law));
+  for (int i = 0; i < JL_PARTIAL_SUMS; i++)
+    for (int j = 0; j < 3; j++) sum[i].F[j] = jl_broadcast(0.0);
+  for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
+    const int count = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
+    const double *f = jl_facet_table(law, at);
+    jl_facet_step o;
+    jl_evaluate_facets(law, n, at, &o);
+    const jl_offset here = jl_offset_at(law, delta[1], delta[2]);
+    o.end = jl_plane_at(f, &here, slopes);
+    if (law->yields) jl_subtract_plastic_force(o.y1, o.z1, o.fz1, &o.f1, &o.k1);
+    o.qs = o.qt = jl_broadcast(0.0);
+    for (int i = 0; i < D; i++) {
+      const int row = jl_slider_row(law) + at * D + i;
+      o.qs += jl_load(n, row, D, count);
+      o.qt += jl_load(n, row + M * D, D, count);
+    }
+    jl_add_facet_traction(law, f, &o.end, o.f1, o.qs, o.qt, dim, law->interlock_decays,
+                          sum[at / JL_FACETS_PER_PASS % JL_PARTIAL_SUMS].F);
+  }
+  for (int i = 0; i < dim; i++) F[i] = jl_total(sum, F[i]);
+  if (jl_element_rows(law)) jl_add_element_traction(law, n, jl_element_row(law), delta, F);
 }
 
 /* Upper bound of |C| over A/c1 of a facet with this Phi', without the part of decaying slopes */

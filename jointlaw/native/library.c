@@ -6,12 +6,12 @@
 
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 
-/* The function for `operation` (0 to 3: advance, measure, refresh, stiffness) and this width */
+/* The function for `operation` (0 to 4: advance, measure, refresh, stiffness, traction) and this width */
 static jlaw_call *find_call(int lanes, int contiguous, int operation)
 {
 #define LEVEL(W)                                                                      \
   if (lanes == W) {                                                                   \
-    extern jlaw_call *const jlaw_calls_##W[4], *const jlaw_calls_##W##_contiguous[4]; \
+    extern jlaw_call *const jlaw_calls_##W[], *const jlaw_calls_##W##_contiguous[];   \
     return (contiguous ? jlaw_calls_##W##_contiguous : jlaw_calls_##W)[operation];    \
   }
 #if JLAW_LEVELS & 8

@@ -7,7 +7,7 @@ from typing import Any
 
 from . import build
 
-ADVANCE, MEASURE, REFRESH, STIFFNESS = range(4)  # operations of jlaw_run
+ADVANCE, MEASURE, REFRESH, STIFFNESS, TRACTION = range(5)  # operations of jlaw_run
 
 REBUILD_HINT = (
     "rebuild it with `python -m jointlaw.native`, or set JOINTLAW_KERNEL=numpy to run without it"

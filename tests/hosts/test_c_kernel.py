@@ -77,13 +77,25 @@ def goes_as_in_python(one, law, seed):
         joint.update(step)
     one.state[:] = joint.snapshot().values[0]
     for step in path[10:]:
-        for a, b in zip(one.step(step), joint.update(step), strict=True):
+        results = one.step(step)
+        for a, b in zip(results, joint.update(step), strict=True):
             np.testing.assert_array_equal(a, b)
         np.testing.assert_array_equal(one.state, joint.snapshot().values[0])
+        for traction in (traction_without_step(one), joint.F):
+            np.testing.assert_array_equal(traction, results[0])
         shares, energies = np.split(one.measures(), [3])
         assert shares == pytest.approx(joint.measures()[:3], abs=1e-9)
         expected = [joint.stored_energy, joint.dissipated_energy]
         assert energies == pytest.approx(expected, rel=1e-12, abs=1e-300)
+
+
+def traction_without_step(one):
+    """`jlaw_traction` of the state, which must stay as it is."""
+    before = one.state.tobytes()
+    F = np.full(one.dim, 4711.0)
+    one.lib.jlaw_traction(one.law, at(one.state), at(F))
+    assert one.state.tobytes() == before
+    return F
 
 
 @pytest.mark.parametrize("name", BUILDS)

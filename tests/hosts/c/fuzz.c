@@ -84,6 +84,10 @@ static int steps(const jlaw_law *law, double size, long count)
       continue;
     }
     if (to != s) memcpy(s, next, bytes);
+    double same[3];
+    jlaw_traction(law, s, same);
+    for (int i = 0; i < dim; i++)
+      if (same[i] != F[i]) return wrong("the traction of a state differs from its step", k);
     if (!finite_all(s, rows) || !finite_all(F, dim)) return wrong("not finite", k);
     if (jlaw_dissipated_energy(law, s) < jlaw_dissipated_energy(law, kept)) return wrong("friction made energy", k);
     if (!(jlaw_stored_energy(law, s) >= 0.0) || jlaw_stored_energy(law, s) > DBL_MAX) return wrong("stored", k);

@@ -4,12 +4,13 @@ other than its default, without naming a parameter here."""
 import math
 from contextlib import suppress
 from dataclasses import dataclass, is_dataclass, replace
-from functools import reduce
+from functools import cached_property, reduce
 from itertools import chain
 
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.kernels.coulomb import CoulombElement
 from jointlaw.laws.law import Law
 from jointlaw.parameters.declared import parameters_of
 from jointlaw.parameters.toml import kinds_of
@@ -49,6 +50,28 @@ class ExponentialHeights:
         return self.scale * np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 40.0])
 
 
+@jl.declared
+@dataclass(frozen=True, kw_only=True)
+class FilledLaw(jl.JointLaw, kind="filled"):
+    """A cemented rough joint beside a filling, Coulomb's joint: two elements of C with damage."""
+
+    filling_stiffness: float = jl.parameter("in closure", "Pa/m", above=0.0)
+    filling_friction: float = jl.parameter("coefficient", low=0.0)
+    filling_cohesion: float = jl.parameter("c", "Pa", low=0.0)
+
+    @cached_property
+    def tables(self):
+        kn = self.filling_stiffness
+        c = self.filling_cohesion
+        filling = jl.CoulombLaw(kn, 0.5 * kn, self.filling_friction, c, 0.5 * c, weakening=1e-6)
+        rough = super().tables
+        return jl.LawTables(rough.dim, (*rough.elements, CoulombElement(filling, rough.dim)))
+
+    def strength_reduced(self, factor):
+        raise NotImplementedError
+
+
+del jl.Law.kinds["filled"]  # the lists of kinds stay those of the package
 HISTOGRAM = jl.Heights(([1, 3, 2], [0.0, 2e-6, 5e-6, 8e-6]), overlap=2e-6)
 LAWS = {
     "population": make_law(),
@@ -64,6 +87,12 @@ LAWS = {
     "bond": make_law(bond=jl.Bond(1e12, 1e12, 5e4, 1e5, 5e-3, 2e-2)),
     "coulomb": jl.CoulombLaw(1e12, 5e11, 0.6, 1e5, 5e4, 0.5, 2e4, 1e-6),
     "coulomb in a plane": jl.CoulombLaw(1e12, 5e11, 0.6, 1e5, plane=0.0),
+    "bond and filling": FilledLaw(
+        **make_law(bond=jl.Bond(1e12, 1e12, 5e4, 1e5), mating_length=2e-6).__getstate__(),
+        filling_stiffness=1e11,
+        filling_friction=0.2,
+        filling_cohesion=1e4,  # tension fails at the opening of the bond's
+    ),
 }
 
 # Values of a parameter, by unit, that change joints which close by 1e-6 m

@@ -170,10 +170,9 @@ class JointBatch:
 
         Does nothing for a law without either. Raises ValueError for a wrong index.
         """
-        row = self.law.tables.first_rows.get("damage")
-        if row is not None:
-            damage = max(element.separated_damage for element in self.law.tables.elements)
-            self._state[block_index(self._state, self._index(index), row)] = damage
+        joints = self._index(index)
+        for row, damage in self.law.tables.damage_rows.items():
+            self._state[block_index(self._state, joints, row)] = damage
 
     def resize(self, n: int) -> None:
         """Change the number of joints to n; the first joints keep their states.
@@ -271,15 +270,19 @@ class JointBatch:
 
     @property
     def damage(self) -> Array:
-        """Damage (n,) of bond or cohesion: 0 intact, 1 broken, and 1 for a law without either."""
-        return np.minimum(self._row("damage", default=1.0), 1.0)
+        """Damage (n,) of bond or cohesion: 0 intact, 1 broken, and 1 for a law without either.
+
+        Of the least damaged one, if several elements of the law can break.
+        """
+        rows = [self._all(row) for row in self.law.tables.damage_rows]
+        return np.min([np.ones(self._n), *rows], axis=0)
 
     # --------------------------------------------------------------- internals
 
-    def _row(self, name: str, default: float = 0.0) -> Array:
-        """A row of the states of all joints by name; `default` for a law without this row."""
+    def _row(self, name: str) -> Array:
+        """A row of the states of all joints by name; zeros for a law without this row."""
         row = self.law.tables.first_rows.get(name)
-        return np.full(self._n, default) if row is None else self._all(row)
+        return np.zeros(self._n) if row is None else self._all(row)
 
     def _all(self, rows: Any) -> Array:
         """Rows of the states of all joints, as a copy (n,) or (n, rows).

@@ -11,10 +11,12 @@ class BondElement(Element):
     """The bond of a joint, with its damage."""
 
     native_name = "bonded"
+    damage_row = "damage"
 
     def __init__(self, bond: Bond) -> None:
         self.bond = bond
         self.rows = {"damage": 1}
+        self.row_bounds = {"damage": (0.0, 1.0)}
         self.tensile_strength = bond.tension
         self.tensile_opening = float(1.0 / bond.limits[1][0])
         self.tensile_stiffness = bond.normal_stiffness

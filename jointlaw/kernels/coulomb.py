@@ -57,12 +57,17 @@ class CoulombElement(Element):
     """
 
     native_name = "coulomb"
+    damage_row = "softening"
     separated_damage = SEPARATED_STATE
 
     def __init__(self, parameters: Any, dim: int) -> None:
         p = parameters
         self.dim = dim
-        self.rows = {"shear_stress": dim - 1, "damage": 1}
+        self.rows = {"shear_stress": dim - 1, "softening": 1}
+        self.row_bounds = {
+            "shear_stress": (-MAX_STRENGTH, MAX_STRENGTH),
+            "softening": (0.0, SEPARATED_STATE),
+        }
         self.normal = p.normal_stiffness
         self.shear = p.shear_stiffness
         self.friction = min(p.friction, INFINITE_FRICTION)

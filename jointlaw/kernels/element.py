@@ -2,6 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -37,15 +39,17 @@ class Element(ABC):
     B joints last. `delta` (dim, B) is the displacement from the interlocked position in m, `state`
     (rows, B) the rows of the state that belong to the element; zeros are the virgin state.
 
-    An element that bears tension sets `tensile_strength`, `tensile_opening` and
-    `tensile_stiffness`, and has a row named "damage" as its last row, 0 while it is intact and >= 1
-    once it has failed.
+    The names of rows differ from the names of all other elements of a law. An element that bears
+    tension sets `tensile_strength`, `tensile_opening` and `tensile_stiffness`, and has a row that
+    `damage_row` names: 0 while the element is intact, and >= 1 once it has failed.
     """
 
     native_name = ""  # its name in native/layout.py; empty if it has no C version
     dim = 1  # least number of components of a displacement
-    rows: dict[str, int]  # number of rows of its state by name
-    separated_damage = 1.0  # damage of joints whose faces meet again after separation
+    rows: dict[str, int]  # number of rows of its state by name; empty without history variables
+    row_bounds: Mapping[str, tuple[float, float]] = MappingProxyType({})  # by name; default: finite
+    damage_row = ""  # name of the row of its damage; empty for an element that does not break
+    separated_damage = 1.0  # its damage once the faces have separated
     tensile_strength = 0.0  # Pa: largest tension of an intact joint
     tensile_opening = 0.0  # m: an intact joint bears tension up to this opening
     tensile_stiffness = 0.0  # Pa/m: normal stiffness of an intact joint up to that opening

@@ -154,10 +154,10 @@ class NumpyEngine:
             if step.commit:
                 state[index] = new.T
             if step.measures is not None:
-                parts = reference.state_parts(self.tables, new)
-                damage = np.minimum(getattr(parts, "damage", np.ones(len(F.T))), 1.0)
+                dim = self.tables.dim
                 measures = reference.measures(self.tables, new)[:4]
-                rows = [*measures, parts.dissipated_energy, damage, *parts.delta]
+                damage = reference.damage(self.tables, new)
+                rows = [*measures, new[dim], damage, *new[:dim]]
                 step.measures[part] = np.stack(rows).T
 
     def refresh(self, state: Array, n: int) -> None:
@@ -183,6 +183,12 @@ class NativeEngine:
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
         pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
         self._law = LawStruct(**numbers, **pointers)
+        rows = loaded.jlaw_state_rows(ctypes.addressof(self._law))
+        if rows != tables.rows:
+            raise ValueError(
+                f"a state of this law has {tables.rows} rows in Python and {rows} in C: the rows "
+                "of an element in kernels/ and in native/ differ"
+            )
         self._sliders = tables.sliders
         self._library_run = loaded.jlaw_run
         self.lanes = library.vector_lanes(loaded)

@@ -4,18 +4,27 @@ import numpy as np
 
 from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import FacetTables
-from ..native.layout import ARRAYS, FACET_LANES, INTEGERS, LARGEST_FLOAT, REALS, column_offsets
+from ..native.layout import (
+    ARRAYS,
+    ELEMENTS,
+    FACET_LANES,
+    INTEGERS,
+    LARGEST_FLOAT,
+    REALS,
+    column_offsets,
+)
 from ..support.checks import Array
 from .asperities import AsperityElement, friction_limit
 from .cells import slider_compliance
+from .element import Element
 from .reference import LawTables
 
 
 def pack(k: LawTables) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` by name, in its order.
 
-    Raises ValueError for an element without a C version, and KeyError for a number that
-    native/layout.py does not name.
+    Raises ValueError for an element without a C version or with other rows there, and KeyError for
+    a number that native/layout.py does not name.
     """
     if k.python_only:
         raise ValueError(
@@ -23,6 +32,7 @@ def pack(k: LawTables) -> tuple[dict[str, int | float], dict[str, Array]]:
             "hosts: use it in Python, or write its functions in native/elements.h and name it in "
             "native/layout.py"
         )
+    _require_same_rows(k.dim, k.elements)
     values = {
         "dim": k.dim,
         "max_effective_closure": min(element.max_effective_closure for element in k.elements),
@@ -42,6 +52,32 @@ def pack(k: LawTables) -> tuple[dict[str, int | float], dict[str, Array]]:
         raise KeyError(f"native/layout.py has no {', '.join(sorted(missing))}")
     numbers |= {name: min(value, LARGEST_FLOAT) for name, value in values.items()}
     return numbers, arrays
+
+
+def _require_same_rows(dim: int, elements: tuple[Element, ...]) -> None:
+    """Raise ValueError unless the elements and their rows are those of native/layout.py."""
+    names = [element.native_name for element in elements]
+    order = ["asperities", *ELEMENTS]
+    if names != [name for name in order if name in names]:
+        raise ValueError(
+            f"a joint in C has each element at most once, in the order {', '.join(order)}; this "
+            f"law has {', '.join(names)}: reorder them in `tables`"
+        )
+    for element in elements:
+        if isinstance(element, AsperityElement):
+            continue
+        rows = ELEMENTS[element.native_name]
+        counts = {name: dim - 1 if row.is_vector else 1 for name, row in rows.items()}
+        bounds = {name: (row.lower, row.upper) for name, row in rows.items()}
+        damage = {name: row.upper for name, row in rows.items() if row.is_damage}
+        own_damage = {element.damage_row: element.separated_damage} if element.damage_row else {}
+        own = element.rows, dict(element.row_bounds), own_damage
+        if list(element.rows) != list(counts) or own != (counts, bounds, damage):
+            raise ValueError(
+                f"{type(element).__name__} has the state rows {element.rows} with bounds "
+                f"{dict(element.row_bounds)} and damage {own_damage}, but {element.native_name!r} "
+                f"in native/layout.py {counts}, {bounds} and {damage}"
+            )
 
 
 def _facet_arrays(

@@ -34,6 +34,23 @@ class LawTables:
     dim: int
     elements: tuple[Element, ...]
 
+    def __post_init__(self) -> None:
+        owners = {"delta": "the joint", "dissipated_energy": "the joint"}
+        for element in self.elements:
+            name = type(element).__name__
+            for row in element.rows:
+                if row in owners:
+                    raise ValueError(
+                        f"{owners[row]} and {name} have a state row of the same name, {row!r}: "
+                        "rename it in one of them"
+                    )
+                owners[row] = name
+            if element.damage_row and element.damage_row not in element.rows:
+                raise ValueError(
+                    f"{name}.damage_row = {element.damage_row!r} is none of its rows: "
+                    f"{', '.join(element.rows) or 'it has none'}"
+                )
+
     @cached_property
     def row_counts(self) -> dict[str, int]:
         """Number of rows of a state by name, in their order."""
@@ -86,7 +103,16 @@ class LawTables:
     @property
     def breaks(self) -> bool:
         """Whether joints have a bond or cohesion, which can break."""
-        return "damage" in self.row_counts
+        return bool(self.damage_rows)
+
+    @cached_property
+    def damage_rows(self) -> dict[int, float]:
+        """Damage of every element that can break, after separation, by its row in a state."""
+        return {
+            self.first_rows[element.damage_row]: element.separated_damage
+            for element in self.elements
+            if element.damage_row
+        }
 
     @property
     def unmated_start(self) -> Array:
@@ -165,6 +191,11 @@ def stiffness(k: LawTables, state: Array) -> Array:
     delta = state[: k.dim]
     bounds = [element.stiffness(delta, rows) for element, (rows,) in k.element_rows(state)]
     return np.sum(bounds, axis=0)
+
+
+def damage(k: LawTables, state: Array) -> Array:
+    """Damage (B,) of states (rows, B): of the least damaged element; 0 to 1, 1 without damage."""
+    return np.min([np.ones(state.shape[1]), *state[list(k.damage_rows)]], axis=0)
 
 
 def measures(k: LawTables, state: Array) -> Measures:

@@ -47,7 +47,7 @@ static void write_measures(const jlaw_batch *b, jl_states n, const jl_measures *
                            double *out, int count)
 {
   const int dim = b->law->dim, row_size = JLAW_MEASURES + dim;
-  const int last_row = jl_state_rows(b->law) - 1;
+  const int element_row = jl_element_row(b->law);
   for (int l = 0; l < count; l++, out += row_size) {
     const double *s = n.s + l;
     out[JLAW_SLIDING] = JL_JOINT(measures->sliding, l);
@@ -55,8 +55,7 @@ static void write_measures(const jlaw_batch *b, jl_states n, const jl_measures *
     out[JLAW_SEPARATED] = JL_JOINT(measures->separated, l);
     out[JLAW_STORED] = JL_JOINT(measures->stored, l);
     out[JLAW_DISSIPATED] = s[(size_t) dim * n.stride];
-    const double damage = jl_element_rows(b->law) ? s[(size_t) last_row * n.stride] : 1.0;
-    out[JLAW_DAMAGE] = damage < 1.0 ? damage : 1.0; /* JLAW_SEPARATED_STATE is larger */
+    out[JLAW_DAMAGE] = jl_damage(b->law, s, element_row, n.stride);
     for (int i = 0; i < dim; i++) out[JLAW_MEASURES + i] = s[(size_t) i * n.stride];
   }
 }

@@ -184,12 +184,11 @@ JL_INLINE double jl_coulomb_step(const jlaw_law *law, jl_element_step *p, int ta
   return touches ? 0.5 * kn * u * u + shear_energy : 0.0;
 }
 
-JL_INLINE int jl_coulomb_rows(const jlaw_law *law) { return law->dim; }
-
-JL_INLINE double jl_coulomb_stiffness(const jlaw_law *law, double damage, double closure)
+JL_INLINE double jl_coulomb_stiffness(const jlaw_law *law, const double *row, double closure)
 {
-  if (damage > 0.0 && closure < 0.0) return 0.0; /* separated */
-  const double mu = jl_coulomb_friction(law, law->coulomb_weakening_length > 0.0 ? damage : 1.0);
+  const double w = row[law->dim - 1];
+  if (w > 0.0 && closure < 0.0) return 0.0; /* separated */
+  const double mu = jl_coulomb_friction(law, law->coulomb_weakening_length > 0.0 ? w : 1.0);
   const double sliding =
       law->coulomb_normal_stiffness * (mu < JLAW_INFINITE_FRICTION ? sqrt(1.0 + mu * mu) : 1.0);
   return sliding > law->coulomb_shear_stiffness ? sliding : law->coulomb_shear_stiffness;

@@ -1,18 +1,61 @@
 /* elements.h: the elements of a joint other than its asperities: bond and Coulomb's law.
  *
  * They advance one joint at a time; symbols and order are those of kernels/bond.py and
- * kernels/coulomb.py. The rows of an element in a state are a vector in the plane of the joint (Pa),
- * if it has one, and its damage: 0 to 1, or JLAW_SEPARATED_STATE. For each element NAME of layout.h
- * this file defines
+ * kernels/coulomb.py. layout.py declares the elements and the rows of their states; an element may
+ * have none. For each element NAME this file defines
  *
- *   jl_NAME_rows       number of its rows
  *   jl_NAME_step       a step, which returns the stored energy at its end
- *   jl_NAME_stiffness  upper bound of |C| at a damage and closure; at (0, 0): of all states
+ *   jl_NAME_stiffness  upper bound of |C| at its rows and a closure; with zeros: of all states
  */
+
+typedef struct { /* rows of one name in the state of a joint */
+  int first, count, is_vector, is_damage;
+  double lower, upper; /* bounds */
+} jl_rows;
+
+/* Number of rows of each element: jl_NAME_rows */
+#define JL_COUNT_ROWS(is_vector, is_damage, lower, upper) +((is_vector) ? law->dim - 1 : 1)
+#define JL_DEFINE_ROWS(name)                              \
+  JL_INLINE int jl_##name##_rows(const jlaw_law *law)     \
+  {                                                       \
+    return law->name ? 0 JLAW_ROWS_OF_##name(JL_COUNT_ROWS) : 0; \
+  }
+JLAW_ELEMENTS(JL_DEFINE_ROWS)
+#undef JL_DEFINE_ROWS
+#undef JL_COUNT_ROWS
+
+/* List the rows of all elements of a law, which begin at `row` of a state; returns their number */
+JL_INLINE int jl_list_rows(const jlaw_law *law, int row, jl_rows list[JLAW_ELEMENT_ROW_NAMES])
+{
+  int n = 0;
+#define JL_LIST_ROWS(vector, damage, low, high)                        \
+  list[n].first = row, list[n].count = (vector) ? law->dim - 1 : 1;    \
+  list[n].is_vector = (vector), list[n].is_damage = (damage);          \
+  list[n].lower = (low), list[n].upper = (high), row += list[n++].count;
+#define JL_LIST_ELEMENT(name) \
+  if (law->name) { JLAW_ROWS_OF_##name(JL_LIST_ROWS) }
+  JLAW_ELEMENTS(JL_LIST_ELEMENT)
+#undef JL_LIST_ELEMENT
+#undef JL_LIST_ROWS
+  return n;
+}
+
+/* Damage of a state, whose rows of elements begin at `row`: of the least damaged element; 0 to 1, and 1
+ * for a law without damage */
+JL_INLINE double jl_damage(const jlaw_law *law, const double *s, int row, size_t stride)
+{
+  double damage = 1.0; /* a row may be larger after separation */
+  jl_rows list[JLAW_ELEMENT_ROW_NAMES];
+  const int n = jl_list_rows(law, row, list);
+  for (int i = 0; i < n; i++)
+    if (list[i].is_damage && s[(size_t) list[i].first * stride] < damage)
+      damage = s[(size_t) list[i].first * stride];
+  return damage;
+}
 
 typedef struct {           /* an element of one joint in a step */
   double from[3], d[3];    /* displacement before the step, and its increment */
-  double row[4];           /* its rows of the state, before and after the step */
+  double row[JLAW_MAX_ELEMENT_ROWS]; /* its rows of the state, before and after the step */
   double F[3], C[9], loss; /* traction, tangent (3, 3), dissipated energy */
 } jl_element_step;
 
@@ -51,13 +94,11 @@ JL_INLINE double jl_bond_damage(const jlaw_law *law, double opening2, double sli
   return root < 1.0 ? root : 1.0;
 }
 
-JL_INLINE int jl_bonded_rows(const jlaw_law *law) { return law->bonded; }
-
-JL_INLINE double jl_bonded_stiffness(const jlaw_law *law, double damage, double closure)
+JL_INLINE double jl_bonded_stiffness(const jlaw_law *law, const double *row, double closure)
 {
   (void) closure;
   const double K[2] = {law->bond_normal_stiffness, law->bond_shear_stiffness};
-  return (1.0 - damage) * (K[0] > K[1] ? K[0] : K[1]);
+  return (1.0 - row[0]) * (K[0] > K[1] ? K[0] : K[1]);
 }
 
 JL_INLINE double jl_bonded_step(const jlaw_law *law, jl_element_step *b, int tangent)
@@ -91,12 +132,20 @@ JL_INLINE double jl_bonded_step(const jlaw_law *law, jl_element_step *b, int tan
 
 /* --------------------------------------------------------- all elements of a joint */
 
-/* Rows of all elements of this file; 0 for a joint of asperities alone */
+/* Whether a law has elements of this file, with or without rows; 0 for asperities alone */
+JL_INLINE int jl_has_elements(const jlaw_law *law)
+{
+#define JL_HAS_ELEMENT(name) || law->name
+  return 0 JLAW_ELEMENTS(JL_HAS_ELEMENT);
+#undef JL_HAS_ELEMENT
+}
+
+/* Rows of all elements of this file in a state */
 JL_INLINE int jl_element_rows(const jlaw_law *law)
 {
-#define JL_ROWS(name) +(law->name ? jl_##name##_rows(law) : 0)
-  return 0 JLAW_ELEMENTS(JL_ROWS);
-#undef JL_ROWS
+#define JL_ADD_ROWS(name) +jl_##name##_rows(law)
+  return 0 JLAW_ELEMENTS(JL_ADD_ROWS);
+#undef JL_ADD_ROWS
 }
 
 /* Advance the elements, whose rows of the state begin at `row`, from the displacement `from` by d.
@@ -162,11 +211,13 @@ JL_INLINE double jl_elements_stiffness_bound(const jlaw_law *law, const double *
                                              size_t stride)
 {
   double bound = 0.0;
-#define JL_STIFFNESS(name)                                          \
-  if (law->name) {                                                  \
-    row += jl_##name##_rows(law);                                   \
-    const double damage = s ? s[(size_t) (row - 1) * stride] : 0.0; \
-    bound += jl_##name##_stiffness(law, damage, s ? s[0] : 0.0);    \
+#define JL_STIFFNESS(name)                                                     \
+  if (law->name) {                                                             \
+    double rows[JLAW_MAX_ELEMENT_ROWS] = {0.0};                                \
+    const int count = jl_##name##_rows(law);                                   \
+    for (int i = 0; s && i < count; i++) rows[i] = s[(size_t) (row + i) * stride]; \
+    bound += jl_##name##_stiffness(law, rows, s ? s[0] : 0.0);                 \
+    row += count;                                                              \
   }
   JLAW_ELEMENTS(JL_STIFFNESS)
 #undef JL_STIFFNESS

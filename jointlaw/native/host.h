@@ -314,16 +314,6 @@ static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
   return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
 }
 
-#define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
-#define JLAW_ELEMENT_ROWS(law) \
-  {JLAW_ELEMENTS(JL_ROWS) - 1} /* number of rows of each element, 0 if the law lacks it; -1 ends */
-
-/* Damage of a joint that touches again after separation, without bond and cohesion */
-static JLAW_FUNCTION double jlaw_separated_damage_(const jlaw_law *law)
-{
-  return law->coulomb ? JLAW_SEPARATED_STATE : 1.0;
-}
-
 /* Whether energies, plastic indentations, degradation and damage of a state are valid for this law */
 static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double *s)
 {
@@ -335,13 +325,11 @@ static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double 
   if (law->degrades)
     valid = valid && degradation[0] >= 0.0 && degradation[0] <= 1.0 && degradation[1] >= 0.0
             && degradation[1] <= DBL_MAX;
-  const double *row = s + jl_element_row(law);
-  const int rows[] = JLAW_ELEMENT_ROWS(law);
-  for (int i = 0; rows[i] >= 0; i++)
-    for (int left = rows[i]; left > 0; left--, row++)
-      valid = valid
-              && (left > 1 ? fabs(*row) < JLAW_MAX_STRENGTH
-                           : *row >= 0.0 && *row <= jlaw_separated_damage_(law));
+  jl_rows rows[JLAW_ELEMENT_ROW_NAMES];
+  const int names = jl_list_rows(law, jl_element_row(law), rows);
+  for (int i = 0; i < names; i++)
+    for (int j = rows[i].first; j < rows[i].first + rows[i].count; j++)
+      valid = valid && s[j] >= rows[i].lower && s[j] <= rows[i].upper;
   return valid
          && jlaw_sliders_are_valid_(s + jl_slider_row(law),
                                     jl_plastic_row(law) - jl_slider_row(law));
@@ -426,15 +414,19 @@ JLAW_FUNCTION double jlaw_tensile_opening(const jlaw_law *law) { return law->ten
 
 JLAW_FUNCTION int jlaw_has_damage(const jlaw_law *law)
 {
-  return jl_state_rows(law) > jl_element_row(law);
+  jl_rows rows[JLAW_ELEMENT_ROW_NAMES];
+  const int names = jl_list_rows(law, jl_element_row(law), rows);
+  int has_damage = 0;
+  for (int i = 0; i < names; i++) has_damage = has_damage || rows[i].is_damage;
+  return has_damage;
 }
 
 JLAW_FUNCTION void jlaw_break_bond(const jlaw_law *law, double *s)
 {
-  double *row = s + jl_element_row(law);
-  const int rows[] = JLAW_ELEMENT_ROWS(law);
-  for (int i = 0; rows[i] >= 0; row += rows[i++]) /* the last row of an element is its damage */
-    if (rows[i]) row[rows[i] - 1] = jlaw_separated_damage_(law);
+  jl_rows rows[JLAW_ELEMENT_ROW_NAMES];
+  const int names = jl_list_rows(law, jl_element_row(law), rows);
+  for (int i = 0; i < names; i++)
+    if (rows[i].is_damage) s[rows[i].first] = rows[i].upper; /* as after separation */
 }
 
 JLAW_FUNCTION int jlaw_init_unmated(const jlaw_law *law, double *s)
@@ -532,11 +524,13 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 static JLAW_FUNCTION void jlaw_rotate_elements_(const jlaw_law *law, double *s,
                                                 const double rotation[2][2])
 {
-  double *row = s + jl_element_row(law);
-  const int rows[] = JLAW_ELEMENT_ROWS(law);
-  for (int i = 0; rows[i] >= 0; row += rows[i++]) {
-    const double q[2] = {rows[i] > 1 ? row[0] : 0.0, rows[i] > 2 ? row[1] : 0.0};
-    for (int j = 0; j < rows[i] - 1; j++) row[j] = rotation[j][0] * q[0] + rotation[j][1] * q[1];
+  jl_rows rows[JLAW_ELEMENT_ROW_NAMES];
+  const int names = jl_list_rows(law, jl_element_row(law), rows);
+  for (int i = 0; i < names; i++) {
+    double *q = s + rows[i].first;
+    const int count = rows[i].is_vector ? rows[i].count : 0;
+    const double old[2] = {count > 0 ? q[0] : 0.0, count > 1 ? q[1] : 0.0};
+    for (int j = 0; j < count; j++) q[j] = rotation[j][0] * old[0] + rotation[j][1] * old[1];
   }
 }
 

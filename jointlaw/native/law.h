@@ -900,12 +900,13 @@ JL_INLINE void jl_evaluate_facets(const jlaw_law *law, jl_states n, int at, jl_f
   jl_first_loading_curve(law, o->z1, &o->fz1, &o->kz1, (jl_real *) 0);
 }
 
-/* Add the energy stored in the elements of elements.h to the measures; Coulomb's law sets the others */
+/* Add the energy stored in the elements of elements.h to the measures; Coulomb's law sets the others
+ * of a joint without asperities */
 JL_INLINE void jl_add_element_measures(const jlaw_law *law, jl_states n, jl_joint_real stored,
                                        jl_measures *all)
 {
   all->stored += stored;
-  for (int l = 0; law->coulomb && l < JL_JOINTS_PER_PASS; l++) {
+  for (int l = 0; law->coulomb && !law->asperities && l < JL_JOINTS_PER_PASS; l++) {
     double fractions[3];
     jl_coulomb_fractions(law, n.s + l, n.stride, fractions);
     JL_JOINT(all->sliding, l) = fractions[0], JL_JOINT(all->slipping, l) = fractions[1];
@@ -934,7 +935,7 @@ JL_INLINE jl_measures jl_measure(const jlaw_law *law, jl_states n)
 #endif
   }
   jl_sum_measures(sum, &all);
-  if (!jl_element_rows(law)) return all;
+  if (!jl_has_elements(law)) return all;
   jl_joint_real delta[3], zero[3];
   for (int i = 0; i < law->dim; i++)
     delta[i] = jl_load_joint(n, i), zero[i] = jl_broadcast_joint(0.0);
@@ -1078,7 +1079,7 @@ JL_INLINE void jl_step_of_kind(const jlaw_law *law, jl_states n, const jl_joint_
   else if (law->interlock_decays) JL_STEP(space_decaying)
   else JL_STEP(space)
 #undef JL_STEP
-  if (!jl_element_rows(law)) return;
+  if (!jl_has_elements(law)) return;
   const jl_joint_real stored =
       jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, track_dissipation);
   if (all) jl_add_element_measures(law, n, stored, all);

@@ -44,6 +44,19 @@ class Field(NamedTuple):
     meaning: str
 
 
+class Row(NamedTuple):
+    """Rows of the state of an element: their bounds, and what they are.
+
+    A vector has one row for each direction in the plane of the joint, any other name one row.
+    Damage is 0 while the element is intact, and `upper` once its faces have separated.
+    """
+
+    lower: float
+    upper: float
+    is_vector: bool = False
+    is_damage: bool = False
+
+
 INTEGERS = {
     "dim": Field("1", "3", "components of a displacement"),
     "facets": Field("0", "1e6", "M"),
@@ -56,7 +69,15 @@ INTEGERS = {
     "bonded": Field("0", "1", "whether the joint has a cohesive bond"),
     "coulomb": Field("0", "1", "whether the joint follows Coulomb's law"),
 }
-ELEMENTS = ("bonded", "coulomb")  # prefixes of their functions in elements.h
+# Elements of elements.h: the prefix of their functions, and the rows of their state by name, in the
+# order of both in a state. `kernels/pack.py` compares them with the elements in Python.
+ELEMENTS = {
+    "bonded": {"damage": Row(0.0, 1.0, is_damage=True)},
+    "coulomb": {
+        "shear_stress": Row(-thresholds.MAX_STRENGTH, thresholds.MAX_STRENGTH, is_vector=True),
+        "softening": Row(0.0, thresholds.SEPARATED_STATE, is_damage=True),
+    },
+}
 REALS = {
     "stiffness_ratio": Field("0", "DBL_MAX", "1/lam: shear over normal stiffness of an asperity"),
     "mu": Field("0", "DBL_MAX", "friction coefficient of asperities"),
@@ -148,6 +169,14 @@ def column_offsets() -> dict[str, int]:
     return dict(zip([*FACET_COLUMNS, "COLUMNS"], offsets, strict=True))
 
 
+def max_element_rows() -> int:
+    """Largest number of rows of an element in a state, in 3-D; at least one."""
+    in_space = [
+        sum(2 if row.is_vector else 1 for row in rows.values()) for rows in ELEMENTS.values()
+    ]
+    return max([1, *in_space])
+
+
 def layout_h() -> str:
     """Generate the text of layout.h."""
     columns = FACET_COLUMNS | {"COLUMNS": (0, "of a facet")}
@@ -165,7 +194,9 @@ def layout_h() -> str:
         f"  JLAW_MAX_AZIMUTHS = {MAX_AZIMUTHS},",
         *(f"  JLAW_{name} = {i}, /* {columns[name][1]} */" for name, i in column_offsets().items()),
         *(f"  JLAW_{name} = {i}, /* {text} */" for i, (name, text) in enumerate(CELL_ROWS.items())),
-        f"  JLAW_ROWS = {len(CELL_ROWS)} /* of a cell */",
+        f"  JLAW_ROWS = {len(CELL_ROWS)}, /* of a cell */",
+        f"  JLAW_ELEMENT_ROW_NAMES = {sum(map(len, ELEMENTS.values()))}, /* of all elements */",
+        f"  JLAW_MAX_ELEMENT_ROWS = {max_element_rows()} /* of one element */",
         "};",
         *(
             f"#define JLAW_{name} {value!r}"
@@ -180,6 +211,15 @@ def layout_h() -> str:
         "  char fingerprint[80];",
         "};",
         f"#define JLAW_ELEMENTS(X) {' '.join(f'X({name})' for name in ELEMENTS)}",
+        "/* State rows of an element: X(1 for a vector, 1 for damage, lower, upper bound) */",
+        *(
+            f"#define JLAW_ROWS_OF_{name}(X) "
+            + " ".join(
+                f"X({int(row.is_vector)}, {int(row.is_damage)}, {row.lower!r}, {row.upper!r})"
+                for row in rows.values()
+            )
+            for name, rows in ELEMENTS.items()
+        ),
         "/* Keywords of a table file: X(name, 1 for an integer, lower bound, upper bound) */",
         "#define JLAW_KEYWORDS(X) \\",
         " \\\n".join(keywords),

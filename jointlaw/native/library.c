@@ -2,6 +2,9 @@
  * sum of the vector widths that this library was built for: 8 for 8 alone, 14 for 8, 4 and 2.
  */
 #include "batch.h"
+#include "lanes.h"
+#include "elements.h"
+#include "law.h"
 #include "export.h"
 
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
@@ -38,6 +41,9 @@ OUT int jlaw_run(jlaw_batch *b, int operation)
     failed = call(b, (long) at, (long) (n - at < chunk ? n : at + chunk));
   return failed;
 }
+
+/* Rows of a state, which Python compares with its own number */
+OUT int jlaw_state_rows(const jlaw_law *law) { return jl_state_rows(law); }
 
 /* Hash of the sources that this library was built from */
 OUT const char *jlaw_sources(void) { return JLAW_SOURCES; }

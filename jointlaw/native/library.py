@@ -61,6 +61,7 @@ def load_file(path: Path) -> ctypes.CDLL:
         raise UnfitLibraryError(message) from error
     library.jlaw_sources.restype = ctypes.c_char_p
     library.jlaw_run.argtypes = [ctypes.c_void_p, ctypes.c_int]
+    library.jlaw_state_rows.argtypes = [ctypes.c_void_p]
     if library.jlaw_sources().decode() != build.hash_sources():
         raise UnfitLibraryError(
             f"{path} was built from sources other than the installed ones: {REBUILD_HINT}"

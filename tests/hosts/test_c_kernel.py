@@ -23,7 +23,9 @@ BUILDS = {  # test_native.py tells the same of the library, which is made of the
 }
 DECLARED = [off_default(name)[0] for name in PARAMETERS]
 DECLARED.append(make_law(heights=ExponentialHeights(1e-6)))  # without parameters as TOML
+DECLARED.append(LAWS["bond and filling"])
 DECLARED.append(random_law(6))  # heights of a density that is infinite at the point of contact
+OTHER_ELEMENTS = "coulomb", "coulomb in a plane", "bond and filling"
 CONSTANTS = """#include "law_{0}.h"
 const jlaw_law *constants_{0}(void);
 const jlaw_law *constants_{0}(void) {{ return &law_{0}; }}
@@ -103,7 +105,7 @@ def test_the_bits_of_python(tmp_path, name):
     cc, flags = BUILDS[name]
     built = library(tmp_path, *flags, cc=cc)
     laws = map(random_law, (0, 3, 7, 10, 13, 14, 20))  # yielding, wear and both, planes
-    for seed, law in enumerate([LAWS["coulomb"], LAWS["coulomb in a plane"], *laws]):
+    for seed, law in enumerate([*map(LAWS.get, OTHER_ELEMENTS), *laws]):
         one = CLaw(built, law, tmp_path)
         goes_as_in_python(one, law, seed)
         many_are_one_by_one(built, one, law)

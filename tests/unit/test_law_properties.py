@@ -1,6 +1,7 @@
 """Tension, stiffness and reduced strength that a law reports, against its joints in the step."""
 
 import math
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,6 +12,8 @@ from own_law import CLAY, Clay, ClayLaw
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
+from jointlaw.kernels.pack import pack
+from jointlaw.support.thresholds import SEPARATED_STATE
 
 STRESS = 1e5  # Pa
 UNDER_SHEAR = {name: law for name, law in LAWS.items() if law.dim > 1}
@@ -53,7 +56,9 @@ def test_secant_stiffness_is_that_of_a_joint_at_the_stress(name):
         assert shear == joint.trial(1e-12 * np.eye(law.dim)[1])[1][1, 1]
     else:
         bond = 0.0 if law.bond is None else law.bond.shear_stiffness
-        assert shear == pytest.approx(stiffness / law.asperity.lam + bond, rel=1e-12)
+        filling = getattr(law, "filling_stiffness", 0.0)
+        expected = (stiffness - filling) / law.asperity.lam + bond + 0.5 * filling
+        assert shear == pytest.approx(expected, rel=1e-12)
 
 
 def test_secant_stiffness_of_an_element_without_a_formula_is_its_tangent():
@@ -173,6 +178,60 @@ def test_a_subclass_of_an_element_with_c_does_not_run_as_its_base():
     own = jl.LawTables(3, (Rough(tables.asperities),))
     assert own.python_only == ["Rough"]
     assert tables.python_only == []
+
+
+def named(name, rows, damage_row="", native_name=""):
+    """An element of a class of this name with these rows, without mechanics."""
+    functions = {"step": None, "stiffness": None}
+    values = {"rows": rows, "damage_row": damage_row, "native_name": native_name}
+    return type(name, (jl.Element,), functions | values)()
+
+
+def test_elements_with_rows_of_one_name_are_refused():
+    rows = {"memory": 2, "wear": 1}
+    with pytest.raises(ValueError, match=r"First and Second have a state row .*'wear': rename"):
+        jl.LawTables(2, (named("First", rows), named("Second", {"wear": 1})))
+    for reserved in ("delta", "dissipated_energy"):
+        with pytest.raises(ValueError, match=f"the joint and First have a state row .*{reserved}"):
+            jl.LawTables(2, (named("First", {reserved: 1}),))
+    with pytest.raises(ValueError, match=r"First.damage_row = 'broken' is none of its rows"):
+        jl.LawTables(2, (named("First", rows, "broken"),))
+
+
+def test_rows_and_order_of_elements_are_those_of_c():
+    rough, bond, filling = LAWS["bond and filling"].tables.elements
+    longer = copy(bond)
+    longer.rows = {"damage": 1, "age": 1}
+    wider = copy(filling)
+    wider.row_bounds = filling.row_bounds | {"softening": (0.0, 3.0)}
+    for elements in ((rough, longer), (rough, bond, wider)):
+        with pytest.raises(ValueError, match=r"has the state rows .* in native/layout\.py"):
+            pack(jl.LawTables(3, elements))
+    for elements in ((rough, filling, bond), (bond, rough)):
+        with pytest.raises(ValueError, match="in the order asperities, bonded, coulomb"):
+            pack(jl.LawTables(3, elements))
+
+
+def test_a_state_of_another_size_in_c_is_refused(monkeypatch):
+    rough = copy(make_law().tables.elements[0])
+    rough.rows = rough.rows | {"age": 1}
+    law = make_law()
+    monkeypatch.setenv("JOINTLAW_KERNEL", "native")
+    monkeypatch.setitem(law.__dict__, "tables", jl.LawTables(3, (rough,)))
+    with pytest.raises(ValueError, match=r"has \d+ rows in Python and \d+ in C"):
+        law.joint()
+
+
+def test_damage_is_that_of_the_least_damaged_element():
+    joints = LAWS["bond and filling"].joints(2)
+    joints.break_bond([1])
+    assert joints.damage.tolist() == [0.0, 1.0]
+    values = joints.snapshot().values
+    rows = list(joints.law.tables.damage_rows)
+    assert values[1, rows].tolist() == [1.0, SEPARATED_STATE]
+    values[:, rows] = [[0.25, 2.0], [1.0, 0.5]]
+    joints.restore(jl.JointState(joints.law.fingerprint, values))
+    assert joints.damage.tolist() == [0.25, 0.5]
 
 
 def test_a_law_that_cannot_be_reduced_says_so():

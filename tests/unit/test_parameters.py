@@ -35,7 +35,8 @@ LAWS = kinds.LAWS | {
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_file_round_trip(law, tmp_path):
+def test_file_round_trip(law, tmp_path, monkeypatch):
+    monkeypatch.setitem(jl.Law.kinds, "filled", kinds.FilledLaw)
     path = tmp_path / "law.toml"
     assert law.to_toml(path) == path.read_text(encoding="utf-8")
     back = jl.JointLaw.from_toml(path)

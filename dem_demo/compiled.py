@@ -32,6 +32,8 @@ FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "compute_forces": ([DOUBLE], None),
     "finish_step": ([DOUBLE], None),
     "compute_unbalanced": ([], ctypes.c_int),
+    "pull_bolts": ([], DOUBLE),
+    "bolt_tractions": ([ctypes.c_int], ctypes.c_int),
     "relax": ([INTEGER], ctypes.c_int),
     "place_solids": ([], None),
     "near_pairs": ([POINTER] * 2 + [INTEGER, POINTER], INTEGER),
@@ -92,6 +94,18 @@ class PointArrays(Arrays):
     """`dem_points` of layout.h: contact points of polyhedra."""
 
     _fields_ = [(name, field.ctype) for name, field in layout.POINTS.items()]
+
+
+class BoltArrays(Arrays):
+    """`dem_bolts` of layout.h: numbers of rock bolts, and addresses of their arrays."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.BOLTS.items()]
+
+
+class RelaxedBolts(Arrays):
+    """`dem_relaxed_bolts` of layout.h: rock bolts in a relaxation."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.RELAXED_BOLTS.items()]
 
 
 def address(array: Any) -> int:

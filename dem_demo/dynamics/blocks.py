@@ -10,7 +10,8 @@ import numpy as np
 import pymunk
 
 from ..contact import ContactManager, Contacts, Outlines
-from ..scene import Drives, Scene, SceneError, Stress
+from ..scene import Drives, FacePressure, Scene, SceneError, Stress
+from .bolts import Bolts
 
 MAX_SKIN_PER_STEP = 0.25  # fraction of its skin that a block may move in a step: no contact missed
 BROAD_PHASE_STEP = 1e-9  # s: pymunk detects pairs in a step; with no velocity nothing moves
@@ -26,7 +27,8 @@ class Blocks:
     drive moves; is_free (n, 3): motions that forces move; is_removed (n,): excavated blocks.
     gravity, steady_loads (n, 3): constant forces (N), gravity with the pseudo-static seismic
     forces; loads (n, 3): steady loads, pressures on edges and support (`apply_loads`); support
-    (n, 3): the remaining part of the forces that removed blocks exerted on the others (N).
+    (n, 3): the remaining part of the forces that removed blocks exerted on the others (N). bolts:
+    the rock bolts, with their forces on the blocks.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -52,6 +54,7 @@ class Blocks:
         start_velocity = np.array([[*block.velocity, block.spin] for block in blocks])
         self.velocity = np.ascontiguousarray((start_velocity * self.is_mobile).T)
         self.motion = np.concatenate([position, self.velocity])
+        self.bolts = Bolts(scene.bolts, self.motion)
         self._neighbours: set[tuple[int, ...]] = set()
         self._build_broad_phase(scene)
         self.remove(list(scene.removed))
@@ -138,18 +141,50 @@ def apply_loads(scene: Scene, blocks: Blocks, manager: ContactManager) -> np.nda
     the same as half of it at either end of the overlap.
     """
     stresses = [stress for stress in (scene.water, scene.in_situ) if stress]
-    if not (stresses or scene.wet or scene.stages):
+    pressures = scene.face_pressures
+    if not (stresses or scene.wet or scene.stages or pressures):
         return 0.0 * blocks.loads
     contacts = manager.contacts
     old_loads = blocks.loads.copy()
     loads = blocks.steady_loads + blocks.support
     for stress in stresses:
         loads += scene.thickness * _stress_on_edges(stress, contacts.outlines, blocks.motion)
+    for face_pressure in pressures:
+        loads += scene.thickness * _pressure_on_faces(
+            face_pressure, contacts.outlines, blocks.motion
+        )
     pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[manager.law]
     push = pressure * contacts.overlap_length.sum(axis=0) * scene.thickness
     loads += contacts.assemble(blocks.motion, push, 0.0 * push)
     blocks.loads[:] = loads * blocks.is_mobile
     return blocks.loads - old_loads
+
+
+def pressure_forces(
+    pressure: FacePressure, outlines: Outlines
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Forces of a uniform pressure on parts of edges, at the present places of the blocks.
+
+    Returns block (p,), place of the force (p,) in m and force per m of thickness (p,) in N/m of
+    each part; vectors are complex.
+    """
+    blocks, edges, first, last = np.array(pressure.parts).T
+    block = blocks.astype(int)
+    corner = outlines.first_corner[block] + edges.astype(int)
+    along = outlines.edge_direction[corner]
+    middle = outlines.corner_position[corner] + 0.5 * (first + last) * along
+    inward = 1j * along
+    return block, middle, inward * pressure.value * (last - first)
+
+
+def _pressure_on_faces(
+    pressure: FacePressure, outlines: Outlines, motion: np.ndarray
+) -> np.ndarray:
+    """Forces and torques (n, 3) of a uniform pressure on parts of edges, per m of thickness."""
+    block, at, force = pressure_forces(pressure, outlines)
+    arm = at - (motion[0] + 1j * motion[1])[block]
+    parts = force.real, force.imag, (arm.conj() * force).imag
+    return np.stack([np.bincount(block, part, motion.shape[1]) for part in parts], axis=1)
 
 
 def _stress_on_edges(stress: Stress, outlines: Outlines, motion: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 In every step
 
-    kinetic + potential + stored + friction + dashpots + discarded - external_work = start
+    kinetic + potential + stored + friction + dashpots + discarded + bolts - external_work = start
 
 holds to rounding for everything that the blocks do, so an error of the balance measures only what
 the joint law gains or loses in a finite step, and contacts that begin or end. It is the check that
@@ -17,9 +17,10 @@ and dashpots from the mean of their forces before and after the step, gravity an
 constant values. Joints have a potential of their own, the stored energy, and dissipate on the area
 that they have at the end of the step.
 
-What leaves the balance for good. "friction": energy dissipated by the joints; "dashpots": by
-viscous damping; "discarded": stored energy of contacts that were removed while they still carried
-load, or became shorter.
+"bolts" is the energy that rock bolts store and have dissipated by yielding, a function of their
+elongations. What leaves the balance for good. "friction": energy dissipated by the joints;
+"dashpots": by viscous damping; "discarded": stored energy of contacts that were removed while they
+still carried load, or became shorter.
 
 `native/blocks.c` adds the entries of each step; this module opens the balance and reads it.
 """
@@ -30,15 +31,16 @@ from ..contact import Joints
 from ..native.layout import ENERGIES
 from .blocks import Blocks
 
-KINETIC, STORED, DISCARDED, EXTERNAL_WORK, TURNOVER = (
-    ENERGIES.index(name) for name in ("kinetic", "stored", "discarded", "external_work", "turnover")
+KINETIC, STORED, DISCARDED, BOLTS, EXTERNAL_WORK, TURNOVER = (
+    ENERGIES.index(name)
+    for name in ("kinetic", "stored", "discarded", "bolts", "external_work", "turnover")
 )
 
 
 class EnergyBalance:
     """Energies (J) of a run; their sum, external work subtracted, is `start`.
 
-    energy (8,): in the order of `ENERGIES`. external_work: of drives, loads and water; turnover:
+    energy (9,): in the order of `ENERGIES`. external_work: of drives, loads and water; turnover:
     sum of the absolute work of gravity, drives and loads, plus the energy at the start, to which
     errors are related. start: the balance at time 0. forces (3, n, 3) in N: total, dashpots and
     drives at the end of the last step; previous_forces (2, n, 3): dashpots and drives one step
@@ -60,7 +62,8 @@ class EnergyBalance:
         v = blocks.motion[3:].T
         self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - half_step**2)).sum()
         self.energy[STORED] = self.area @ joints.stored_energy
-        self.start = float(self.energy[KINETIC] + self.energy[STORED])
+        self.energy[BOLTS] = blocks.bolts.pull()
+        self.start = float(self.energy[KINETIC] + self.energy[STORED] + self.energy[BOLTS])
         self.energy[TURNOVER] = self.start
 
     def change_loads(self, blocks: Blocks, change: np.ndarray, dt: float) -> None:

@@ -55,7 +55,7 @@ def find_unbalanced(scene: Scene, blocks: Blocks, contacts: Contacts, joints: Jo
     push, shear = (joints.traction * contacts.length[:, None] * scene.thickness).T
     stored_energy = joints.stored_energy * scene.thickness
     joint_forces = contacts.assemble(blocks.motion, push, -shear, stored_energy)
-    unbalanced = joint_forces + blocks.gravity + blocks.loads
+    unbalanced = joint_forces + blocks.gravity + blocks.loads + blocks.bolts.forces
     return unbalanced_force_ratio(blocks, unbalanced) > MAX_UNBALANCED_RATIO
 
 
@@ -93,6 +93,7 @@ def static_system(
         contacts.length * scene.thickness,
         start,
         joints,
+        blocks.bolts.static(blocks.motion, blocks.inverse_sqrt_inertia),
     )
 
 
@@ -222,8 +223,8 @@ def equilibrium_displacements(
 
     Scaled by the square root of the inertia; None without an equilibrium. All loads act at
     once. guess: displacements of a similar scene from which the search starts, by default the stick
-    predictor. unstable (n,): blocks that need no equilibrium; they move away, so their contacts
-    bear nothing.
+    predictor. unstable (n,): blocks that need no equilibrium; they move away, so their contacts and
+    bolts bear nothing.
     """
     blocks = Blocks(scene)
     joints = Joints(scene)
@@ -234,6 +235,7 @@ def equilibrium_displacements(
     contacts = manager.contacts
     has_moved_away = known_unstable[contacts.block_a] | known_unstable[contacts.block_b]
     search.area[np.tile(has_moved_away, 2)] = 0.0
+    search.bolts.release(known_unstable)
     start = search.stick_predictor() if guess is None else guess
     solution = search.solve(start, known_unstable, name_unstable=False)
     return solution.displacement if solution.verdict is Verdict.EQUILIBRIUM else None

@@ -24,6 +24,7 @@ import jointlaw as jl
 from jointlaw.native.library import load as load_law_library
 
 from ..compiled import RelaxationArrays, RelaxedLaw, address
+from .bolts import StaticBolts
 
 MASS_FACTOR = 0.28  # masses over row sums of the stiffness: 0.25 is the limit of stability
 CLOSURE_GROWTH = 1.6  # closures during the iterations over the first ones: bounds the stiffness
@@ -81,6 +82,7 @@ class Relaxation:
     blocks. is_free (n, dof). Motions may have any units if forces are the ones that do work on
     them. reduction: factor of a strength reduction. stiffness_at: upper bound (k,) in Pa/m of the
     stiffness at closures (k,) in m; stiffness_closed (k,): the same where nothing touches at first.
+    bolts: rock bolts between the same blocks.
     """
 
     def __init__(
@@ -97,16 +99,25 @@ class Relaxation:
         stiffness_at: Callable[[np.ndarray], np.ndarray],
         stiffness_closed: np.ndarray,
         reduction: float = 1.0,
+        bolts: StaticBolts | None = None,
     ) -> None:
         dim, both = kinematics.shape[1:]
         shape = (len(load), both // 2)
+        bolts = bolts or StaticBolts.none(both)
+        self.n_joints = len(area)
+        self.bolt_stiffness = bolts.stiffness
+        # A bolt is a contact point of area 1 that opens as the bolt gets longer
+        shortening = np.zeros((len(bolts.elongation), dim, both))
+        shortening[:, 0] = -bolts.kinematics
+        length_left = np.zeros((len(bolts.elongation), dim))
+        length_left[:, 0] = -bolts.elongation
         self.stiffness_at = stiffness_at
         self.stiffness_closed = stiffness_closed
-        self.block_a = np.ascontiguousarray(block_a, np.int64)
-        self.block_b = np.ascontiguousarray(block_b, np.int64)
-        self.kinematics = np.ascontiguousarray(kinematics, float)
-        self.area = np.ascontiguousarray(area, float)
-        self.start = np.ascontiguousarray(start, float)
+        self.block_a = np.append(block_a, bolts.block_a).astype(np.int64)
+        self.block_b = np.append(block_b, bolts.block_b).astype(np.int64)
+        self.kinematics = np.ascontiguousarray(np.concatenate([kinematics, shortening]))
+        self.area = np.append(area, np.ones(len(shortening)))
+        self.start = np.ascontiguousarray(np.concatenate([start, length_left]))
         self.reduction = np.append(1.0, np.full(dim - 1, reduction))
         self.load = np.ascontiguousarray(load * is_free, float)
         self.is_free = np.array(is_free, float, order="C")
@@ -116,9 +127,18 @@ class Relaxation:
         self.callbacks: list[Any] = []  # which C holds
         self.zero = np.zeros(1, np.int64)
         self.steps = [self._law_step(one, np.flatnonzero(law == i)) for i, one in enumerate(laws)]
-        self.laws = (RelaxedLaw * len(laws))(*(self._law_arrays(*step) for step in self.steps))
+        relaxed_laws = [self._law_arrays(*step) for step in self.steps]
+        self.bolt_points = np.arange(self.n_joints, len(self.area))
+        if len(self.bolt_points):
+            relaxed_laws.append(bolts.relaxed_law(self.bolt_points, dim))
+        self.relaxed_laws = relaxed_laws  # which keep their arrays alive
+        self.laws = (RelaxedLaw * len(relaxed_laws))(*relaxed_laws)
         self.arrays = RelaxationArrays(
-            n_blocks=len(load), n_laws=len(laws), dim=dim, dof=shape[1], ramp=RAMP_ITERATIONS
+            n_blocks=len(load),
+            n_laws=len(relaxed_laws),
+            dim=dim,
+            dof=shape[1],
+            ramp=RAMP_ITERATIONS,
         )
         self.arrays.bind(self, *INPUT_ARRAYS, *WORK_ARRAYS)
         self.scale = float(np.linalg.norm(self.load)) or 1.0
@@ -198,6 +218,7 @@ class Relaxation:
         a, b, dof = self.block_a, self.block_b, y.shape[1]
         both = np.concatenate([y[a], y[b]], axis=1)
         closure = self.start[:, 0] + np.einsum("km,km->k", self.kinematics[:, 0], both)
+        closure = closure[: self.n_joints]
         is_closed = closure > 0
         if is_closed.any():
             stiffness = self.stiffness_at(CLOSURE_GROWTH * closure)
@@ -205,6 +226,7 @@ class Relaxation:
             stiffness = np.maximum(stiffness, OPEN_JOINT_STIFFNESS * typical)
         else:
             stiffness = self.stiffness_closed
+        stiffness = np.append(stiffness, self.bolt_stiffness)
         size = np.abs(self.kinematics)
         row_sum = size.sum(axis=2)  # (k, dim): over the motions of both blocks
         mass = np.zeros_like(y)

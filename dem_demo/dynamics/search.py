@@ -21,10 +21,11 @@ from functools import partial, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import bmat, csc_array, csr_array, diags
+from scipy.sparse import bmat, csc_array, csr_array, diags, vstack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
+from .bolts import StaticBolts
 from .relaxation import UNSTABLE_FRACTION, Relaxation, Verdict
 
 # Newton's method
@@ -61,7 +62,8 @@ class StaticSystem(NamedTuple):
 
     block_a, block_b (k,): blocks that meet at a point. kinematics (k, dim, 2 dof): closure and
     shears by the scaled motions of both. area (k,) in m2. start (k, dim): closure and shears in m
-    at the present places. joints: virgin joints of the points (`contact.Joints`).
+    at the present places. joints: virgin joints of the points (`contact.Joints`). bolts: the rock
+    bolts, None without any.
     """
 
     mass: np.ndarray
@@ -75,6 +77,7 @@ class StaticSystem(NamedTuple):
     area: np.ndarray
     start: np.ndarray
     joints: Any
+    bolts: StaticBolts | None = None
 
 
 def free_motion_matrix(
@@ -103,6 +106,13 @@ def _size(columns: np.ndarray) -> np.ndarray:
     return reduce(np.hypot, np.abs(columns).T)
 
 
+class Stiffness(NamedTuple):
+    """Tangent stiffness of joints (dim k, dim k) in Pa/m, and of bolts (b,) in N/m."""
+
+    joints: csr_array
+    bolts: np.ndarray
+
+
 class Solution(NamedTuple):
     """Result of a search: displacements (m,) of the free motions, unstable blocks (n,), and the
     verdict on all other blocks."""
@@ -128,6 +138,11 @@ class EquilibriumSearch:
         self.kinematics = free_motion_matrix(
             system.block_a, system.block_b, system.kinematics, system.is_free
         )
+        bolts = system.bolts or StaticBolts.none(system.kinematics.shape[2])
+        self.bolts = bolts
+        self.bolt_kinematics = free_motion_matrix(
+            bolts.block_a, bolts.block_b, bolts.kinematics[:, None, :], system.is_free
+        )
         self.area = np.tile(system.area, self.dim)
         self.start = system.start.T.ravel()
         self.root = system.scale[system.is_free]
@@ -138,6 +153,7 @@ class EquilibriumSearch:
         self.force = system.force[system.is_free] * self.root
         self.zero = np.zeros(len(self.block))
         touched = sum(abs(self.kinematics[i * self.k : (i + 1) * self.k]) for i in range(self.dim))
+        touched = vstack([touched, abs(self.bolt_kinematics)])
         self.island = connected_components(touched.T @ touched, directed=False)[1]
 
     def expand(self, values: np.ndarray) -> np.ndarray:
@@ -205,6 +221,7 @@ class EquilibriumSearch:
             stiffness_at,
             np.maximum(joints.interpolate("stiffness", "stress", high_stress), tensile),
             joints.reduction[1],
+            self.bolts,
         )
 
     def _finish(self, is_fixed: np.ndarray, y: np.ndarray) -> np.ndarray | None:
@@ -270,9 +287,11 @@ class EquilibriumSearch:
         stiffness = self._assemble_stiffness(self._unbalanced(y)[1]).diagonal()
         return float(np.median(stiffness[stiffness > 0])) if (stiffness > 0).any() else 0.0
 
-    def _assemble_stiffness(self, C: csr_array) -> csc_array:
-        """Stiffness (m, m) of the blocks from the stiffness C (dim k, dim k) of the joints."""
-        return (self.kinematics.T @ (diags(self.area) @ C) @ self.kinematics).tocsc()
+    def _assemble_stiffness(self, stiffness: Stiffness) -> csc_array:
+        """Stiffness (m, m) of the blocks from the stiffness of joints and bolts."""
+        of_joints = self.kinematics.T @ (diags(self.area) @ stiffness.joints) @ self.kinematics
+        of_bolts = self.bolt_kinematics.T @ diags(stiffness.bolts) @ self.bolt_kinematics
+        return (of_joints + of_bolts).tocsc()
 
     def stick_predictor(self) -> np.ndarray:
         """First guess (m,): displacements if no joint can slide.
@@ -284,8 +303,8 @@ class EquilibriumSearch:
         y, _, _ = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
         return y
 
-    def _unbalanced(self, y: np.ndarray, can_slide: bool = True) -> tuple[np.ndarray, csr_array]:
-        """Unbalanced forces (m,) and joint stiffness (dim k, dim k) at displacements y (m,)."""
+    def _unbalanced(self, y: np.ndarray, can_slide: bool = True) -> tuple[np.ndarray, Stiffness]:
+        """Unbalanced forces (m,), and stiffness of joints and bolts, at displacements y (m,)."""
         d = (self.start + self.kinematics @ y).reshape(self.dim, -1).T
         if can_slide:
             F, C, _ = self.joints.trial(d)
@@ -294,7 +313,10 @@ class EquilibriumSearch:
         parts = range(self.dim)
         joint_stiffness = csr_array(bmat([[diags(C[:, i, j]) for j in parts] for i in parts]))
         joint_forces = self.kinematics.T @ (self.area * F.T.ravel())
-        return self.force - joint_forces, joint_stiffness
+        tension, bolt_stiffness = self.bolts.tension(self.bolt_kinematics @ y)
+        bolt_forces = self.bolt_kinematics.T @ tension
+        unbalanced = self.force - joint_forces - bolt_forces
+        return unbalanced, Stiffness(joint_stiffness, bolt_stiffness)
 
     def _step(
         self,

@@ -27,7 +27,7 @@ from jointlaw.support.files import write_files
 from ..contact import MAX_SKIN_UNTIL_REBUILD, STATE_PARTS, ContactManager, Contacts, Joints
 from ..scene import Files, Scene, SceneError, parse
 from .blocks import MAX_SKIN_PER_STEP, Blocks, apply_loads
-from .energy_balance import DISCARDED, EnergyBalance
+from .energy_balance import BOLTS, DISCARDED, EnergyBalance
 from .equilibrium import create_joints, find_unbalanced, settle
 from .relaxation import Verdict
 from .timestep import MAX_FRACTION_OF_LIMIT, TimeStepLimit, impact_limit
@@ -47,13 +47,15 @@ FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
 IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
 MAX_HALVINGS = 8  # of a time step that was chosen automatically
 FILE = "state.npz"
-VERSION = 11
+VERSION = 12
 UPDATED_IN_PLACE = (  # arrays of the state that the compiled step, or views of them, refer to
     "blocks.motion",
     "blocks.velocity",
     "blocks.loads",
     "blocks.is_removed",
     "blocks.support",
+    "blocks.bolts.yielding",
+    "blocks.bolts.tension",
     "blocks.drives.reversed_at",
     "stage_start_times",
     "manager.rebuilt_at",
@@ -157,6 +159,7 @@ class Simulation:
         self.steps_since_change += 1
         drives = self.blocks.drives
         drives.aim[:] = drives.velocity(self.time, self.dt)
+        self.energy_balance.energy[BOLTS] = self.blocks.bolts.pull()
         self.arrays.call("finish_step", self.dt)
         if self.arrays.stiffened:
             self._check_time_step()
@@ -270,12 +273,13 @@ class Simulation:
         """Time step (s): the scene's fraction of the limit, or a fraction for what can happen."""
         scene = self.scene
         limit = self.limit.current
-        if not np.isfinite(limit):  # nothing touches yet
+        if not np.isfinite(limit) or not self.limit.checked_stiffness.any():  # nothing touches yet
             stiffness = max(
                 float(np.interp(IMPACT_STRESS, joints.curve["stress"], joints.curve["stiffness"]))
                 for joints in self.joints.by_law
             )
-            limit = impact_limit(scene, self.blocks, self.manager.outlines, stiffness)
+            outlines = self.manager.outlines
+            limit = min(limit, impact_limit(scene, self.blocks, outlines, stiffness))
         if not np.isfinite(limit):
             raise SceneError("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
@@ -304,6 +308,7 @@ class Simulation:
         manager.update(blocks.motion)
         self.initial = blocks.motion.copy()
         joints.update(manager.closure, sliding)
+        blocks.bolts.pull()
         self.unstable = find_unbalanced(scene, blocks, self.contacts, joints)
         if not self.unstable.any():
             verdict = Verdict.EQUILIBRIUM
@@ -344,7 +349,7 @@ class Simulation:
         arrays.n_driven = len(drives.rows)
         arrays.bind(
             blocks, "motion", "velocity", "inertia", "gravity", "loads", "inverse_mass", "radius",
-            "is_mobile", skin=blocks.skins,
+            "is_mobile", skin=blocks.skins, bolt_forces=blocks.bolts.forces,
         )  # fmt: skip
         arrays.bind(driven_block=drives.rows, driven_axis=drives.axes, driven_velocity=drives.aim)
         arrays.bind(manager, "max_overlap", "closure_offset", "needs_rebuild", "rebuilt_at")

@@ -12,7 +12,7 @@ from contextlib import suppress
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import csc_array, csr_array, diags
+from scipy.sparse import csc_array, csr_array, diags, vstack
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from ..contact import Contacts, Joints, Outlines
@@ -70,9 +70,15 @@ class TimeStepLimit:
             return
         self.lowest_bound = min(self.lowest_bound, self.current)
         dashpots = np.concatenate([run.dashpot_normal * critical, run.dashpot_shear * critical])
-        self.current = largest_step(
-            opening_and_sliding_rates(blocks, contacts), np.tile(stiffness, 2), dashpots
-        )
+        bolts = blocks.bolts
+        rates = opening_and_sliding_rates(blocks, contacts)
+        springs = np.tile(stiffness, 2)
+        if bolts.n:
+            bolt_rates = bolts.rates(blocks.motion, blocks.inverse_sqrt_inertia, blocks.is_free)
+            rates = vstack([rates, bolt_rates]).tocsr()
+            springs = np.append(springs, bolts.stiffness)
+            dashpots = np.append(dashpots, 0.0 * bolts.stiffness)
+        self.current = largest_step(rates, springs, dashpots)
         self.lowest = min(self.lowest, self.current)
 
     def require_stable(self, dt: float) -> None:
@@ -121,7 +127,8 @@ def _largest_eigenvalue(sums: np.ndarray, inverse_sqrt_inertia: np.ndarray) -> f
 def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> float:
     """Lower bound (s) of the largest stable step; infinite without springs.
 
-    stiffness (k,) in N/m and dashpot (k,) in N s/m act along normal and tangent alike. A spring
+    stiffness (k,) in N/m and dashpot (k,) in N s/m act along normal and tangent alike; bolts act
+    too. A spring
     between two movable blocks stores at most twice the energy that each alone would store in it, so
     the largest eigenvalue is at most the one of the worst block on springs twice as stiff.
     """
@@ -130,15 +137,20 @@ def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> f
     weight = 1.0 + (is_movable[contacts.block_a] & is_movable[contacts.block_b])
     centroid = blocks.motion[0] + 1j * blocks.motion[1]
 
-    def largest(springs: np.ndarray) -> float:
-        sums = sum(
+    def sums_of_contacts(springs: np.ndarray) -> np.ndarray:
+        return sum(
             _spring_sums(block, contacts.position - centroid[block], weight * springs, n)
             for block in (contacts.block_a, contacts.block_b)
         )
-        return _largest_eigenvalue(sums, blocks.inverse_sqrt_inertia)
 
-    k = largest(stiffness)
-    c = largest(dashpot)
+    springs = sums_of_contacts(stiffness)
+    bolts = blocks.bolts
+    if bolts.n:
+        start, end = bolts.ends(blocks.motion).T
+        for block, at in ((bolts.block_a, start), (bolts.block_b, end)):
+            springs = springs + _spring_sums(block, at - centroid[block], 2 * bolts.stiffness, n)
+    k = _largest_eigenvalue(springs, blocks.inverse_sqrt_inertia)
+    c = _largest_eigenvalue(sums_of_contacts(dashpot), blocks.inverse_sqrt_inertia)
     return 4 / (c + np.sqrt(c * c + 4 * k)) if k else np.inf
 
 

@@ -474,7 +474,9 @@ EXPORT void dem_compute_forces(dem_step *sim, double dt)
     for (int j = 0; j < 3; j++) {
       const long long at = 3 * i + j;
       if (!sim->is_mobile[i]) total[at] = damped[at] = 0.0;
-      else total[at] = (total[at] + damped[at]) + (sim->gravity[at] + sim->loads[at]);
+      else
+        total[at] = (total[at] + damped[at]) +
+                    (sim->gravity[at] + sim->loads[at] + sim->bolt_forces[at]);
     }
   for (long long i = 0; i < sim->n_driven; i++) {
     const long long block = sim->driven_block[i], axis = sim->driven_axis[i];

@@ -17,6 +17,7 @@ ENERGIES = (
     "friction",
     "dashpots",
     "discarded",
+    "bolts",
     "external_work",
     "turnover",
 )
@@ -81,6 +82,7 @@ STEP = {
     "inertia": Field("const double *", "(n, 3): mass, mass, moment of inertia"),
     "gravity": Field("const double *", "(n, 3): N"),
     "loads": Field("const double *", "(n, 3): other loads, N and N m"),
+    "bolt_forces": Field("const double *", "(n, 3): of rock bolts, N and N m"),
     "inverse_mass": Field("const double *", "(n,): 1/kg, 0 for a block that forces do not move"),
     "radius": Field("const double *", "(n,): m, from the centroid to the farthest corner"),
     "skin": Field("const double *", "(n,): m"),
@@ -198,6 +200,29 @@ POINTS = {
     "point": Field("double *", "(capacity, 3): on face a, m"),
     "area": Field("double *", "(capacity,): m2"),
 }
+BOLTS = {
+    "n_bolts": Field("long long", "b"),
+    "n_blocks": Field("long long", "n"),
+    "block_a": Field("const long long *", "(b,): blocks in which the ends are anchored"),
+    "block_b": Field("const long long *", "(b,)"),
+    "local_a": Field("const dem_vector *", "(b,): ends, from the centroid, block not rotated"),
+    "local_b": Field("const dem_vector *", "(b,)"),
+    "stiffness": Field("const double *", "(b,): N/m"),
+    "capacity": Field("const double *", "(b,): N"),
+    "free_length": Field("const double *", "(b,): m, without tension, before any yielding"),
+    "yielding": Field("double *", "(b,): plastic elongation, m"),
+    "tension": Field("double *", "(b,): N"),
+    "motion": Field("const double *", "(6, n): of the blocks, as in dem_step"),
+    "forces": Field("double *", "(n, 3): on the blocks, N and N m"),
+}
+RELAXED_BOLTS = {
+    "n_bolts": Field("long long", "b"),
+    "dim": Field("long long", "components of a displacement"),
+    "stiffness": Field("const double *", "(b,): N/m"),
+    "capacity": Field("const double *", "(b,): N"),
+    "d": Field("const double *", "(b, dim): first component: minus the elongation, m"),
+    "F": Field("double *", "(b, dim): first component: minus the tension, N"),
+}
 STRUCTURES = {
     "dem_law_joints": LAW_JOINTS,
     "dem_step": STEP,
@@ -205,6 +230,8 @@ STRUCTURES = {
     "dem_relaxation": RELAXATION,
     "dem_solids": SOLIDS,
     "dem_points": POINTS,
+    "dem_bolts": BOLTS,
+    "dem_relaxed_bolts": RELAXED_BOLTS,
 }
 
 

@@ -11,6 +11,7 @@ from ..scene import Scene, rotation
 
 POINT_COLUMNS = ("x_m", "y_m", "vx_m/s", "vy_m/s")
 JOINT_COLUMNS = ("normal_Pa", "shear_Pa", "closure_m", "slip_m", "sliding_fraction")
+BOLT_COLUMNS = ("force_N", "elongation_m", "yielding_m")
 DEFAULT_SLIP_DISTANCE = 2e-3  # m, for laws without a finite mating length
 PEAK_SEARCH = 1.2  # slip distances within which friction peaks
 PEAK_SEARCH_STEPS = 120
@@ -88,7 +89,7 @@ def _facing_edge(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarr
 
 
 def read_monitors(sim: Simulation) -> dict[str, float]:
-    """Return the present readings of `[monitor]` by name; names end in their unit.
+    """Return the present readings of `[monitor]` and of all bolts by name; names end in their unit.
 
     History points are relative to the base, whose own displacement and velocity are read too if a
     drive moves it.
@@ -106,6 +107,11 @@ def read_monitors(sim: Simulation) -> dict[str, float]:
         reading = dict(zip(POINT_COLUMNS, motion.tolist(), strict=True))
         reading["displacement_m"] = float(np.hypot(*(motion[:2] - point)))
         groups.append((f"point {i + 1}", reading))
+    bolts = sim.blocks.bolts
+    elongation = bolts.elongation(sim.blocks.motion)
+    for i, columns in enumerate(zip(bolts.tension, elongation, bolts.yielding, strict=True)):
+        reading = dict(zip(BOLT_COLUMNS, map(float, columns), strict=True))
+        groups.append((f"bolt {i + 1}", reading))
     if scene.base is not None and scene.blocks[scene.base].moves:
         groups.append(("base", dict(zip(POINT_COLUMNS, base_motion.tolist(), strict=True))))
     return {f"{name}: {key}": value for name, group in groups for key, value in group.items()}
@@ -163,11 +169,13 @@ def predict_slip(scene: Scene, law_name: str, moving: int, length: float) -> dic
 
     Returns `predicted_angle` (degrees) of the base and `normal_stress` (Pa) at slip. They are found
     together, because the normal stress falls as the base tilts. Both are None without contact or
-    gravity, with water, with seismic coefficients, and for a stress that the law cannot carry.
+    gravity, with water, seismic coefficients, bolts or pressures on faces, and for a stress that
+    the law cannot carry.
     """
     weight = scene.blocks[moving].section.mass * np.hypot(*scene.gravity)
     angle = FIRST_ANGLE
-    is_predicted = length > 0 and not scene.wet and not any(scene.seismic)
+    other_forces = scene.wet or any(scene.seismic) or scene.bolts or scene.face_pressures
+    is_predicted = length > 0 and not other_forces
     with suppress(ValueError, jl.PathError):
         for _ in range(MAX_ITERATIONS if is_predicted else 0):
             previous = angle

@@ -25,6 +25,7 @@ from .record import CREEP_RATE, RunRecord, report_lines
 FIXED_COLOUR = "#8d8d8d"
 MARKED_COLOUR = "#c2187a"
 WATER_COLOUR = "#1f6fd0"
+BOLT_COLOURS = {"bolt": "#00703c", "bolt at its capacity": "#8a1a8f"}
 DISPLACEMENT_COLOURS = ListedColormap(colormaps["Purples"](np.linspace(0.05, 0.65, 100)))
 JOINT_STATES = {  # colour and line style
     "stuck": ("#3a3a3a", "-"),
@@ -42,6 +43,8 @@ FRAME_RATE = 11  # 1/s
 ANIMATION_DPI = 75
 FINAL_COST = 4.0  # time to draw the last frame over the time of a frame of the animation: pixels
 MAX_NAMED_BLOCKS = 12  # in a picture with more blocks none bears its name
+MAX_LABELLED_BOLTS = 12  # in a picture with more bolts none bears its force
+CAPACITY_FRACTION = 0.999  # of its capacity: beyond it a bolt is drawn as being there
 MIN_DISTANCE = 1e-6  # m: smaller displacements have no colour and no arrow
 MIN_ARROW = 0.02  # of the largest displacement: smaller ones get no arrow
 MARGIN = 0.07  # of the extent of the blocks
@@ -151,6 +154,9 @@ class Pictures:
             entries.append((f"displacement, drawn × {self.arrow_scale:g}", arrow))
         if scene.water:
             entries.append(("water table", {"color": WATER_COLOUR, "ls": "-."}))
+        if scene.bolts:
+            for label, colour in BOLT_COLOURS.items():
+                entries.append((label, {"color": colour, "lw": 2.5}))
         if self.marked.any():
             entries.append((self.mark, {"color": MARKED_COLOUR, "lw": 2.0}))
         return entries
@@ -171,6 +177,7 @@ class Pictures:
         if record.scene.water:
             axes.plot(*record.scene.water.line.T, color=WATER_COLOUR, lw=1.5, ls="-.", zorder=4)
         self._draw_joints(axes, i)
+        self._draw_bolts(axes, i)
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
                  ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
         title = f"{self.title}\nt = {record.times[i]:.2f} s{note}"
@@ -203,6 +210,19 @@ class Pictures:
                     joints["ends"][mask], linewidths=widths[mask], colors=colour, ls=line, zorder=3
                 )
             )
+
+    def _draw_bolts(self, axes: Axes, i: int) -> None:
+        """Draw the bolts of frame i, and their forces if they are few."""
+        bolts = self.record.bolts[i]
+        capacity = np.array([bolt.capacity for bolt in self.record.scene.bolts])
+        is_full = bolts["tension_N"] >= CAPACITY_FRACTION * capacity
+        for (_, colour), mask in zip(BOLT_COLOURS.items(), (~is_full, is_full), strict=True):
+            lines = LineCollection(bolts["ends"][mask], colors=colour, linewidths=2.5, zorder=4)
+            axes.add_collection(lines)
+        if len(capacity) <= MAX_LABELLED_BOLTS:
+            for ends, tension in zip(bolts["ends"], bolts["tension_N"], strict=True):
+                axes.text(*ends.mean(axis=0), f"{1e-3 * tension:.3g} kN", fontsize="small",
+                          ha="center", va="bottom", clip_on=True, zorder=6)  # fmt: skip
 
     @style()
     def final(self, path: Path) -> None:

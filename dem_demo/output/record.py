@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..dynamics.blocks import pressure_forces
 from ..dynamics.energy_balance import ENERGIES
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, median_size
@@ -24,7 +25,8 @@ class RunRecord:
     blocks. energy[f] (9,): energies (J) and relative energy error. joints[f]: columns by name:
     "blocks" (k, 2), "ends" (k, 2, 2) of the segment of joint that a contact carries (m), "law" (k,)
     its number in the scene, and numbers (k,) with their unit in the name. stresses[f] (3, n): xx,
-    yy, xy of the blocks (Pa). readings[f]: of `[monitor]`.
+    yy, xy of the blocks (Pa). readings[f]: of `[monitor]` and of the bolts. bolts[f]: "ends"
+    (b, 2, 2) in m, "tension_N" and "yielding_m" (b,).
 
     slips: entries of monitored slips; joint_laws: laws of monitored joints; last_state: state of
     the last frame; steps: of the run until then; unstable (n,): blocks without static equilibrium
@@ -46,6 +48,7 @@ class RunRecord:
         self.energy: list[list[float]] = []
         self.joints: list[dict[str, np.ndarray]] = []
         self.stresses: list[np.ndarray] = []
+        self.bolts: list[dict[str, np.ndarray]] = []
         self.readings: list[dict[str, float]] = []
         self.add_frame(sim)
 
@@ -56,6 +59,7 @@ class RunRecord:
         self.energy.append([*sim.energy_balance.energy.tolist(), sim.energy_balance.error])
         self.joints.append(_read_joints(sim))
         self.stresses.append(block_stresses(sim))
+        self.bolts.append(_read_bolts(sim))
         self.readings.append(read_monitors(sim))
         self.last_state = sim.state()
 
@@ -155,20 +159,42 @@ def _read_joints(sim: Simulation) -> dict[str, np.ndarray]:
     return {name: column[contacts.length > 0] for name, column in columns.items()}
 
 
+def _read_bolts(sim: Simulation) -> dict[str, np.ndarray]:
+    """Return the entries of `RunRecord.bolts`."""
+    bolts = sim.blocks.bolts
+    ends = bolts.ends(sim.blocks.motion)
+    return {
+        "ends": np.stack([ends.real, ends.imag], axis=-1),
+        "tension_N": bolts.tension.copy(),
+        "yielding_m": bolts.yielding.copy(),
+    }
+
+
 def block_stresses(sim: Simulation) -> np.ndarray:
     """Mean stress xx, yy, xy (3, n) in each block (Pa, compression positive).
 
-    It is the sum of contact force times arm over the volume of the block. NaN for blocks that other
-    forces act on: fixed and driven ones, and blocks that in-situ stress loads from outside.
+    It is the sum of force times arm, of contacts, bolts and pressures on faces, over the volume of
+    the block. NaN for blocks that other forces act on: fixed and driven ones, and blocks that
+    in-situ stress loads from outside.
     """
     contacts = sim.contacts
     blocks = sim.scene.blocks
     normal, shear = (sim.joints.traction * contacts.length[:, None]).T
     force_on_b = (normal + 1j * shear) * contacts.normal
-    force = np.concatenate([force_on_b, -force_on_b])
-    block = np.concatenate([contacts.block_a, contacts.block_b])
-    centroid = (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
-    arm = np.tile(contacts.position, 2) - centroid
+    bolts = sim.blocks.bolts
+    start, end = bolts.ends(sim.blocks.motion).T
+    pull = bolts.tension / sim.scene.thickness * np.exp(1j * np.angle(end - start))
+    loaded = [contacts.block_a, contacts.block_b, bolts.block_a, bolts.block_b]
+    places = [contacts.position, contacts.position, start, end]
+    opposite = [force_on_b, -force_on_b, -pull, pull]  # of the forces on the blocks
+    for pressure in sim.scene.face_pressures:
+        block, place, force = pressure_forces(pressure, contacts.outlines)
+        loaded.append(block)
+        places.append(place)
+        opposite.append(-force)
+    block = np.concatenate(loaded)
+    force = np.concatenate(opposite)
+    arm = np.concatenate(places) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
     xx = force.real * arm.real
     yy = force.imag * arm.imag
     xy = 0.5 * (force.real * arm.imag + force.imag * arm.real)
@@ -177,6 +203,24 @@ def block_stresses(sim: Simulation) -> np.ndarray:
     if stress := sim.scene.in_situ:
         is_loaded[contacts.outlines.block[stress.edges]] = True
     return np.where(is_loaded, np.nan, sums / [block.section.area for block in blocks])
+
+
+def bolt_summary(record: RunRecord) -> list[dict]:
+    """Describe each bolt: its ends as drawn (m), capacity, force at the end and largest force of
+    all frames (N), and plastic elongation (m)."""
+    largest = np.max([frame["tension_N"] for frame in record.bolts], axis=0)
+    last = record.bolts[-1]
+    return [
+        {
+            "from": list(bolt.ends[0]),
+            "to": list(bolt.ends[1]),
+            "capacity_N": bolt.capacity,
+            "force_N": float(last["tension_N"][i]),
+            "largest_force_N": float(largest[i]),
+            "yielding_m": float(last["yielding_m"][i]),
+        }
+        for i, bolt in enumerate(record.scene.bolts)
+    ]
 
 
 def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable]) -> None:

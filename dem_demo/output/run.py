@@ -18,7 +18,7 @@ from ..scene import Scene, SceneError, median_size
 from .folder import BLOCKS, HISTORY, LAST_VALID_STATE, STATE, clear_run
 from .monitors import update_slip_monitors
 from .pictures import Pictures, curves
-from .record import RunRecord, list_blocks, outcomes
+from .record import RunRecord, bolt_summary, list_blocks, outcomes
 
 MAX_STEPS = 1e8  # of a run: days for a hundred blocks
 SLIP_CHECK_INTERVAL = 8  # steps
@@ -87,6 +87,7 @@ def summarise(sim: Simulation, record: RunRecord, stopped: BaseException | None 
         "contact_points": sim.joints.n,
         "joint_stresses": "effective" if sim.scene.wet else "total",
         "stage_start_s": [start if start < np.inf else None for start in start_times],
+        "bolts": bolt_summary(record),
         "energy_J": dict(zip(ENERGIES, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
         "max_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),

@@ -20,7 +20,8 @@ def write(record: RunRecord, folder: Path) -> None:
     Blocks carry their number, displacement relative to the base, velocity, spin, whether they were
     unstable at the start, the principal values of their mean stress (compression positive; the
     second is the smaller one) and the first as a vector along its direction. Joints carry the
-    numbers of the record and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open.
+    numbers of the record and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open. Of a scene with
+    bolts also bolts_N.vtu and bolts.pvd, with tension and plastic elongation.
     """
     folder.mkdir(parents=True, exist_ok=True)
     pictures = Pictures(record)
@@ -29,7 +30,9 @@ def write(record: RunRecord, folder: Path) -> None:
         _block_mesh(record, i).write(folder / f"blocks_{i:04d}.vtu")
         states = np.array([names.index(name) for name in pictures.states(i)], float)
         _joint_mesh(record.joints[i], states).write(folder / f"joints_{i:04d}.vtu")
-    for kind in ("blocks", "joints"):
+        if record.scene.bolts:
+            _lines(record.bolts[i]).write(folder / f"bolts_{i:04d}.vtu")
+    for kind in ("blocks", "joints", "bolts")[: 3 if record.scene.bolts else 2]:
         root = Element("VTKFile", type="Collection", version="0.1")
         files = SubElement(root, "Collection")
         for i, time in enumerate(record.times):
@@ -65,10 +68,16 @@ def _block_mesh(record: RunRecord, i: int) -> meshio.Mesh:
 
 def _joint_mesh(joints: dict[str, np.ndarray], states: np.ndarray) -> meshio.Mesh:
     """Joints of a frame as lines."""
-    columns = {name: [column] for name, column in joints.items() if name not in ("blocks", "ends")}
-    ends = joints["ends"].reshape(-1, 2)
+    columns = {name: column for name, column in joints.items() if name != "blocks"}
+    return _lines(columns | {"state": states})
+
+
+def _lines(columns: dict[str, np.ndarray]) -> meshio.Mesh:
+    """Lines between the column "ends" (k, 2, 2) in m, with the numbers (k,) of the other ones."""
+    ends = columns["ends"].reshape(-1, 2)
     cells = [("line", np.arange(len(ends)).reshape(-1, 2))]
-    return meshio.Mesh(_in_space(ends), cells, cell_data=columns | {"state": [states]})
+    data = {name: [column] for name, column in columns.items() if name != "ends"}
+    return meshio.Mesh(_in_space(ends), cells, cell_data=data)
 
 
 def _in_space(points: np.ndarray) -> np.ndarray:

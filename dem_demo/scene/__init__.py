@@ -5,6 +5,7 @@ blocks     convex blocks
 laws       joint laws and Coulomb's law
 drives     prescribed motions
 cutting    an outline cut along joint sets
+supports   rock bolts and pressures on faces
 scene      a scene in memory, and the error of a state that it cannot continue from
 read       a scene from its file
 """
@@ -15,13 +16,16 @@ from .keys import Tables, overlay
 from .laws import INTACT_ROCK, TYPICAL_STRESS, Files, build_law
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene, SceneError, Stress
+from .supports import Bolt, FacePressure
 
 __all__ = [
     "INTACT_ROCK",
     "TEMPLATE",
     "TYPICAL_STRESS",
     "Block",
+    "Bolt",
     "Drives",
+    "FacePressure",
     "Files",
     "Run",
     "Scene",

@@ -135,6 +135,11 @@ SCENE = {
                         partial(one_of, choices=("fixed", "rollers", "loaded"))),
     },
     "water": {"table!": polyline, "unit_weight": POSITIVE},
+    "bolt": [{
+        "from!": vector, "to!": vector, "stiffness!": POSITIVE, "capacity!": POSITIVE,
+        "pretension": NOT_NEGATIVE,
+    }],
+    "pressure": [{"from!": vector, "to!": vector, "value!": NOT_NEGATIVE}],
     "monitor": {"slip": LIST, "shear": LIST, "points": points, "joints": points},
 }  # fmt: skip
 

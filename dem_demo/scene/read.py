@@ -18,6 +18,7 @@ from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of
 from .laws import INTACT_ROCK, Files, build_law, intact_rock_law
 from .scene import SKIN_PER_MEDIAN_WIDTH, Rock, Run, Scene, Stress
+from .supports import read_bolts, read_pressures
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
@@ -26,7 +27,7 @@ SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1
 DEFAULTS = {  # of the top level; m/s2, kg/m3, m
     "gravity": (0.0, -9.81), "seismic": (0.0, 0.0), "density": 2600.0, "thickness": 1.0,
     "monitor": {},
-    **dict.fromkeys(("block", "rock", "drive", "joint", "excavate"), ()),
+    **dict.fromkeys(("block", "rock", "drive", "joint", "excavate", "bolt", "pressure"), ()),
 }  # fmt: skip
 CORNER_LENGTH_PER_WIDTH = 0.1  # of the narrowest block
 SOFT_PER_SKIN = 0.25  # of the skin of the narrowest block
@@ -141,11 +142,14 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     joint_laws = {*edge_laws.values()} - {INTACT_ROCK}
     for law in [default, *pairs.values(), *sorted(joint_laws)]:
         one_of(f"{where}: law", law, tuple(laws))
+    stages = tuple(_stages(top["excavate"], blocks, where))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
         edge_laws, drives, top["gravity"], top["seismic"], top["thickness"], water, in_situ,
-        pressure, tuple(_stages(top["excavate"], blocks, where)), **monitors,
+        pressure, stages, **monitors,
+        bolts=tuple(read_bolts(top["bolt"], blocks, stages, where)),
+        face_pressures=tuple(read_pressures(top["pressure"], blocks, where)),
     )  # fmt: skip
     skin = scene.skins.min()
     if INTACT_ROCK in edge_laws.values():

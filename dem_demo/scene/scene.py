@@ -11,6 +11,7 @@ from .blocks import Block, median_width
 from .drives import Drive
 from .keys import Tables
 from .laws import Files
+from .supports import Bolt, FacePressure
 
 SKIN_PER_MEDIAN_WIDTH = 0.02  # of the blocks that move
 MAX_SKIN_PER_WIDTH = 0.1  # of a block's own width
@@ -97,7 +98,8 @@ class Scene:
     water: pore pressure in joints and on faces; in_situ: stress before an excavation; pressure:
     water pressure (Pa) in the joints of a law, by its name. stages: excavation stages, each with
     its `blocks`, its `start` (s; None: once the rock is at rest) and its `release_time` (s).
-    removed: blocks that are absent from the beginning.
+    removed: blocks that are absent from the beginning. bolts, face_pressures: rock bolts, and
+    pressures on faces of blocks.
 
     slip, shear: monitored joints, as (moving block, base); point_joints: monitored joints nearest
     to given points, as two blocks; points: history points, as (block, position in m). reduction:
@@ -124,6 +126,8 @@ class Scene:
     pressure: dict[str, float] = field(default_factory=dict)
     stages: tuple[Tables, ...] = ()
     removed: tuple[int, ...] = ()
+    bolts: tuple[Bolt, ...] = ()
+    face_pressures: tuple[FacePressure, ...] = ()
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
     point_joints: tuple[tuple[int, int], ...] = ()

@@ -55,6 +55,8 @@ class ForceBalance(NamedTuple):
     area: np.ndarray
     law: np.ndarray
     strengths: Sequence[Strength]
+    bolts: csr_array  # (m, b): generalised forces by unit tensions of the bolts
+    capacity: np.ndarray  # (b,) in N
 
 
 def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBalance:
@@ -77,6 +79,13 @@ def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBala
         is_included = ~excluded[block_of_motion]
         motions = motions[is_included]
         load = load[is_included]
+    bolts = blocks.bolts
+    bolt_motions = -bolts.rates(blocks.motion, blocks.inverse_sqrt_inertia, blocks.is_free).T
+    bolt_motions = bolt_motions.tocsr()
+    holds = np.ones(bolts.n, bool)
+    if excluded is not None:
+        bolt_motions = bolt_motions[is_included]
+        holds = ~(excluded[bolts.block_a] | excluded[bolts.block_b])
     stress = overburden_stress(scene)
     strengths = [strength_of(law, stress) for law in scene.laws.values()]
     return ForceBalance(
@@ -86,6 +95,8 @@ def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBala
         contacts.length[bearing] * scene.thickness,
         manager.law[bearing],
         strengths,
+        bolt_motions[:, np.flatnonzero(holds)],
+        bolts.capacity[holds],
     )
 
 
@@ -134,7 +145,8 @@ def can_balance(balance: ForceBalance, factor: float) -> bool:
 
     Unknowns of each contact: the normal force above -tension, N + T = p + q with p, q >= 0, and the
     shear force (mu/F) (p - q) + s with |s| bounded by the rest of the cohesion. They respect the
-    steepest line of its strength by themselves; further lines are inequalities. Raises RuntimeError
+    steepest line of its strength by themselves; further lines are inequalities. The tension of a
+    bolt is between zero and its capacity, which is not divided. Raises RuntimeError
     where the solver decides nothing.
     """
     scale = np.abs(balance.load).max()
@@ -154,12 +166,19 @@ def can_balance(balance: ForceBalance, factor: float) -> bool:
     cohesive = np.flatnonzero(rest > 0)
     sliding = balance.shear @ diags(slope)
     equations = hstack(
-        [balance.normal + sliding, balance.normal - sliding, balance.shear[:, cohesive]]
+        [
+            balance.normal + sliding,
+            balance.normal - sliding,
+            balance.shear[:, cohesive],
+            balance.bolts,
+        ]
     ).tocsr()
     right_side = -balance.load / scale + balance.normal @ tension
     bounds = np.zeros((equations.shape[1], 2))
     bounds[: 2 * count, 1] = np.inf
-    bounds[2 * count :] = np.stack([-rest[cohesive], rest[cohesive]], axis=1)
+    first_bolt = 2 * count + len(cohesive)
+    bounds[2 * count : first_bolt] = np.stack([-rest[cohesive], rest[cohesive]], axis=1)
+    bounds[first_bolt:, 1] = balance.capacity / scale
     rows, limits = _further_lines(balance, first, factor, area, slope, tension, cohesive)
     for method in ("highs-ipm", "highs-ds"):
         solution = linprog(
@@ -194,7 +213,7 @@ def _further_lines(balance, first, factor, area, slope, tension, cohesive):
                     (k[has_rest], place[contacts[has_rest]], np.full(has_rest.sum(), sign)),
                 ]
                 row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
-                shape = (len(contacts), 2 * count + len(cohesive))
+                shape = (len(contacts), 2 * count + len(cohesive) + len(balance.capacity))
                 rows.append(csr_array((value, (row, column)), shape=shape))
                 limits.append(bound)
     if not rows:

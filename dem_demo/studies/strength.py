@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
-from shapely import Point, Polygon
+from shapely import MultiPoint, Point, Polygon, unary_union
 from tqdm import tqdm
 
 from jointlaw.support.files import write_json
@@ -27,6 +27,7 @@ from ..output.pictures import Pictures
 from ..output.record import format_blocks, list_blocks
 from ..output.run import run_to_failure
 from ..scene import Scene, Tables, build, median_size, read_tables, rotation
+from ..scene.blocks import LENGTH_TOLERANCE
 from .limit_analysis import limit_factor
 
 TRIALS_VERSION = 4
@@ -374,5 +375,15 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
         for stage in data.get("excavate", [])
         if outline.intersection(Polygon(stage["corners"])).area > 0
     ]
+    other_shapes = [Polygon(block.corners) for block in scene.blocks if block.name in other_blocks]
+    region = unary_union([outline, *other_shapes]).buffer(LENGTH_TOLERANCE * outline.length)
+
+    def is_inside(support: Tables) -> bool:
+        """Whether both ends of a bolt, or of a line of pressure, lie in this rock or in blocks that
+        are defined one by one."""
+        return region.covers(MultiPoint([support["from"], support["to"]]))
+
     parts = {"joint": joints, "excavate": stages, "rock": [table], "monitor": {}}
+    for key in ("bolt", "pressure"):
+        parts[key] = [*filter(is_inside, data.get(key, []))]
     return build({**data, **parts}, files=scene.files)

@@ -102,6 +102,10 @@ MONITORED = BLOCKS | {
         "joints": [[0.1, 0.5]],
     }
 }
+BOLT = {"from": [0.1, 0.7], "to": [0.1, -0.4], "stiffness": 1e7, "capacity": 2e4, "pretension": 1e3}
+BOLTED = BLOCKS | {"bolt": [BOLT]}
+WEAKLY_BOLTED = BLOCKS | {"gravity": [20.0, -9.81], "bolt": [BOLT | {"capacity": 2e3}]}
+PUSHED = BLOCKS | {"pressure": [{"from": [-0.15, 0.9], "to": [0.35, 0.9], "value": 1e3}]}
 
 
 def drive(**keys):
@@ -205,6 +209,14 @@ PROBES = {  # path of the key: scene, where the key is in it, another value
     "in_situ.top": (IN_SITU, "in_situ.top", "fixed"),
     "water.table": (WET, "water.table", [[0.0, 0.3]]),
     "water.unit_weight": (WET, "water.unit_weight", 9000.0),
+    "bolt.from": (BOLTED, "bolt.0.from", [0.0, 0.6]),
+    "bolt.to": (BOLTED, "bolt.0.to", [0.0, -0.4]),
+    "bolt.stiffness": (BOLTED, "bolt.0.stiffness", 2e7),
+    "bolt.capacity": (WEAKLY_BOLTED, "bolt.0.capacity", 2.5e3),
+    "bolt.pretension": (BOLTED, "bolt.0.pretension", 2e3),
+    "pressure.from": (PUSHED, "pressure.0.from", [0.0, 0.9]),
+    "pressure.to": (PUSHED, "pressure.0.to", [0.2, 0.9]),
+    "pressure.value": (PUSHED, "pressure.0.value", 2e3),
     "monitor.slip": (MONITORED, "monitor.slip", []),
     "monitor.shear": (MONITORED, "monitor.shear", []),
     "monitor.points": (MONITORED, "monitor.points", [[0.2, 0.1]]),

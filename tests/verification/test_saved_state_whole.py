@@ -23,8 +23,12 @@ from dem_demo.output.run import run
 
 ROUNDING = 1e-9  # relative
 # Parts of a simulation whose arrays and numbers are compared
-PARTS = ("", "blocks", "blocks.drives", "manager", "contacts", "joints", "energy_balance", "limit")
+PARTS = (
+    "", "blocks", "blocks.drives", "blocks.bolts", "manager", "contacts", "joints",
+    "energy_balance", "limit",
+)  # fmt: skip
 OVERWRITTEN = {
+    "blocks.bolts.forces",
     "blocks.drives.aim",
     "contacts.previous_length",
     "energy_balance.previous_forces",
@@ -104,6 +108,14 @@ FAST = (
     + block("one", box=[1.0, 0.5], at=[0.0, 5.25], velocity=[0.0, -5.0])
     + "[run]\nend = 1.0\nrecord = 0.003\nskin = 2e-3\n"
 )
+# A block pulls a bolt that yields when the state is saved and unloads later
+BOLTED = (
+    f"[laws.plain]\n{coulomb(0.1)}{BASE}"
+    + block("one", box=[1.0, 0.5], at=[0.0, 0.25], velocity=[0.03, 0.0])
+    + "[[bolt]]\n"
+    + lines(**{"from": [0.0, 0.3], "to": [-0.5, -0.3]}, stiffness=2e8, capacity=8e3)
+    + "[run]\nend = 1.0\nrecord = 0.003\n"
+)
 SCENES = {  # text, steps before the state is saved, steps of the resumed run
     "impact": (IMPACT, 60, 60),
     "bounced": (IMPACT, 200, 30),
@@ -113,6 +125,7 @@ SCENES = {  # text, steps before the state is saved, steps of the resumed run
     "near": (TRANSFERRED, 60, 100),
     "rocking": (ROCKING, 200, 300),
     "fast": (FAST, 20, 60),
+    "bolted": (BOLTED, 60, 120),
 }
 
 
@@ -269,5 +282,8 @@ def test_what_is_not_saved_is_overwritten_before_it_is_read(scene, simulations, 
     def overwrite(restored):
         for path in OVERWRITTEN:
             attrgetter(path)(restored)[...] = np.nan
+        bolts = restored.blocks.bolts
+        bolts.forces[:] = 0.0  # of blocks without bolts they are never written
+        bolts.forces[[*bolts.block_a, *bolts.block_b]] = np.nan
 
     assert outcome(sim.scene, sim.state(), steps, tmp_path, overwrite) == expected[scene]

@@ -8,6 +8,7 @@ flight   a block flies with spin under gravity and a load, seen from fixed rock 
 stack    two blocks stand on a base, pore pressure between them, water beside them that is deeper
          on the left
 slide    a block slides down a plane with constant friction
+anchored a block that a bolt and a pressure on its top press on a base
 
 Lengths of joint, forces and energies are those of a section `THICKNESS` thick. Expected values are
 pairs: the value, and the absolute tolerance.
@@ -113,6 +114,7 @@ class Flight:
             "friction": 0.0,
             "dashpots": 0.0,
             "discarded": 0.0,
+            "bolts": 0.0,
             "external_work": work,
             "turnover": at_rest + fallen + work,  # all work is positive
         }
@@ -198,6 +200,7 @@ class Flight:
             "contact_points": 0,
             "joint_stresses": "total",
             "slip": [],
+            "bolts": [],
             "rocks": [
                 {
                     "rock": "blocks",
@@ -317,7 +320,8 @@ class Stack:
         half_width = self.width / 2
         stored = THICKNESS * half_width * (normal_energy + shear_energy)
         nothing = dict.fromkeys(
-            ("kinetic", "potential", "friction", "dashpots", "discarded", "external_work"), 0.0
+            ("kinetic", "potential", "friction", "dashpots", "discarded", "bolts", "external_work"),
+            0.0,
         )
         return nothing | {"stored": stored, "turnover": stored}
 
@@ -431,6 +435,7 @@ class Stack:
             "contact_points": 4,
             "joint_stresses": "effective",
             "slip": [],
+            "bolts": [],
             "rocks": [
                 {
                     "rock": "stack",
@@ -506,6 +511,7 @@ class Slide:
             "friction": force * max(slid - elastic_slip, 0.0),
             "dashpots": 0.0,
             "discarded": 0.0,
+            "bolts": 0.0,
             "external_work": 0.0,
             "turnover": 0.5 * self.mass * self.speed**2 + fallen,
         }
@@ -631,6 +637,7 @@ class Slide:
                     ),
                 }
             ],
+            "bolts": [],
             "rocks": [
                 {
                     "rock": "blocks",
@@ -646,7 +653,156 @@ class Slide:
         }
 
 
-SCENES = {scene.title: scene for scene in (Flight(), Stack(), Slide())}
+class Anchored:
+    """Equilibrium of a spring below and a bolt through the middle, which slackens with closure."""
+
+    title = "anchored"
+    block_names = ("base", "slab")
+    times = np.array([0.0, 0.01, 0.02])
+    time_step = 2e-4
+    density = 2500.0
+    g = 10.0
+    box = np.array([2.0, 1.0])
+    base_box = np.array([4.0, 1.0])
+    base = np.array([1.0, -0.5])
+    stiffness = 1e9
+    bolt_stiffness = 4e8
+    pretension = 6e4
+    capacity = 2e5
+    bolt_ends = np.array([[1.0, 0.75], [1.0, -0.75]])
+    pressure = 2e4
+    files = ()
+    text = (
+        lines(title=title, gravity=[0.0, -g], density=density, thickness=THICKNESS)
+        + f"[laws.bed]\n{coulomb(0.5, stiffness, 5e8)}"
+        + block("base", box=base_box, at=base, fixed=True)
+        + block("slab", box=box, at=[1.0, 0.5])
+        + "[[bolt]]\n"
+        + lines(**{"from": bolt_ends[0], "to": bolt_ends[1]})
+        + lines(stiffness=bolt_stiffness, capacity=capacity, pretension=pretension)
+        + "[[pressure]]\n"
+        + lines(**{"from": [0.0, 1.0], "to": [2.0, 1.0]}, value=pressure)
+        + f"[run]\nend = 0.02\nrecord = 0.01\nstep = {time_step}\n"
+    )
+    mass = THICKNESS * density * box.prod()
+    area = THICKNESS * box[0]
+    closure = (mass * g + pressure * area + pretension) / (stiffness * area + bolt_stiffness)
+    tension = pretension - bolt_stiffness * closure
+    stress = stiffness * closure
+    place = np.array([1.0, 0.5 - closure])
+
+    energy_tolerance = 1e-4
+
+    def energies(self, t):
+        stored = self.area * self.stress**2 / self.stiffness / 2
+        bolts = self.tension**2 / self.bolt_stiffness / 2
+        nothing = dict.fromkeys(
+            ("kinetic", "potential", "friction", "dashpots", "discarded", "external_work"), 0.0
+        )
+        return nothing | {"stored": stored, "bolts": bolts, "turnover": stored + bolts}
+
+    def energy_error(self, t):
+        return 0.0
+
+    def monitors(self, t):
+        return {
+            "bolt 1: force_N": (self.tension, 1e-3),
+            "bolt 1: elongation_m": (self.tension / self.bolt_stiffness, ROUNDING),
+            "bolt 1: yielding_m": (0.0, 0),
+        }
+
+    def blocks(self):
+        still = ("displacement_m", "displacement_x_m", "displacement_y_m", "rotation_deg")
+        x, y = np.transpose([self.base, self.place])
+        return dict.fromkeys((*still, "speed_m/s", "largest_joint_slip_m"), zeros(2)) | {
+            "x_m": (x, ROUNDING),
+            "y_m": (y, ROUNDING),
+            "unstable_at_start": zeros(2),
+        }
+
+    def cells(self):
+        vectors = (np.zeros((2, 3)), ROUNDING)
+        return {
+            "block": ([0, 1], 0),
+            "displacement_m": vectors,
+            "rotation_rad": zeros(2),
+            "velocity_m/s": vectors,
+            "spin_rad/s": zeros(2),
+            "unstable": zeros(2),
+        }
+
+    def stresses(self):
+        """Of the joint below, the pressure above, and the bolt at its end: force times arm."""
+        arms = 0.5 * self.box[1] * (self.stress + self.pressure) * self.box[0]
+        arms += self.tension / THICKNESS * (self.bolt_ends[0, 1] - 0.5)
+        return [None, np.diag([0.0, arms / self.box.prod()])], 1.0
+
+    def corners(self):
+        corners = [corners_of(self.base_box, self.base), corners_of(self.box, self.place)]
+        return np.concatenate(corners), ROUNDING
+
+    def segments(self):
+        left, middle, right = [0.0, 0.0], [1.0, 0.0], [2.0, 0.0]
+        return np.array([[left, middle], [middle, right]]), 1e-4  # settlement
+
+    def joints(self):
+        ones = np.ones(2)
+        return dict.fromkeys(
+            ("law", "shear_m", "sliding", "slipping", "separated", "slip_rate_m/s", "state"),
+            zeros(2),
+        ) | {
+            "closure_m": (self.closure * ones, ROUNDING),
+            "normal_stress_Pa": (self.stress * ones, 1.0),
+            "shear_stress_Pa": (0.0 * ones, 1.0),
+            "length_m": (ones, ROUNDING),
+        }
+
+    def bolts(self):
+        return {"tension_N": ([self.tension], 1e-3), "yielding_m": ([0.0], 0)}
+
+    def summary(self):
+        inertia = self.mass * (self.box**2).sum() / 12
+        # the bolt acts along y, where the block vibrates more slowly than it rocks
+        corner = self.stiffness * self.area / 2
+        limit = critical_step(
+            [(self.mass, inertia, [1.0, 0.5])], [(corner, [x, 0.0], None, 0) for x in (0.0, 2.0)]
+        )
+        return {
+            "steps": 100,
+            "time_step_limit_s": pytest.approx(limit, rel=1e-4),
+            "time_step_margin": pytest.approx(limit / self.time_step, rel=1e-4),
+            "equilibrium": "in equilibrium",
+            "started_in_equilibrium": True,
+            "unstable": [],
+            "contact_points": 2,
+            "joint_stresses": "total",
+            "slip": [],
+            "bolts": [
+                {
+                    "from": self.bolt_ends[0].tolist(),
+                    "to": self.bolt_ends[1].tolist(),
+                    "capacity_N": self.capacity,
+                    "force_N": pytest.approx(self.tension, abs=1e-3),
+                    "largest_force_N": pytest.approx(self.tension, abs=1e-3),
+                    "yielding_m": 0.0,
+                }
+            ],
+            "rocks": [
+                {
+                    "rock": "blocks",
+                    "state": "stable",
+                    "blocks": 1,
+                    "settlement_m": pytest.approx(self.closure, rel=1e-6),
+                    "displacement_m": pytest.approx(0.0, abs=ROUNDING),
+                    "failed_blocks": 0,
+                    "failure_displacement_m": pytest.approx(0.1 * np.sqrt(self.box.prod())),
+                    "creep_m_per_s": pytest.approx(0.0, abs=ROUNDING),
+                }
+            ],
+        }
+
+
+SCENES = {scene.title: scene for scene in (Flight(), Stack(), Slide(), Anchored())}
 
 
 @pytest.fixture(scope="module", params=SCENES)
@@ -680,11 +836,12 @@ def columns(path):
 def test_files_are_the_known_ones(written):
     """Each file is read by a test of this module."""
     scene, folder = written
-    frames = [f"vtk/{kind}_{i:04d}.vtu" for kind in ("blocks", "joints") for i in range(3)]
-    tables = ["history.csv", "blocks.csv", "summary.json", "vtk/blocks.pvd", "vtk/joints.pvd"]
+    kinds = ["blocks", "joints"] + ["bolts"] * ("[[bolt]]" in scene.text)
+    frames = [f"vtk/{kind}_{i:04d}.vtu" for kind in kinds for i in range(3)]
+    tables = ["history.csv", "blocks.csv", "summary.json", *(f"vtk/{kind}.pvd" for kind in kinds)]
     actual = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert actual == {*frames, *tables, "state/state.npz"}
-    for kind in ("blocks", "joints"):
+    for kind in kinds:
         listed = list(ElementTree.parse(folder / "vtk" / f"{kind}.pvd").iter("DataSet"))
         times = [float(entry.get("timestep")) for entry in listed]
         assert times == pytest.approx(scene.times, abs=1e-12)
@@ -764,6 +921,18 @@ def test_every_field_of_joints_in_vtk(written):
     np.testing.assert_allclose(ends, segments, atol=tolerance)
     actual = {name: part[order] for name, (part,) in mesh.cell_data.items()}
     compare(actual, scene.joints(), "joints.vtu")
+
+
+def test_every_field_of_bolts_in_vtk(written):
+    scene, folder = written
+    if "[[bolt]]" not in scene.text:
+        return
+    mesh = meshio.read(folder / "vtk" / "bolts_0002.vtu")
+    (cells,) = mesh.cells
+    assert cells.type == "line"
+    ends = scene.bolt_ends - [[0.0, scene.closure], [0.0, 0.0]]
+    np.testing.assert_allclose(mesh.points[cells.data], [in_space(ends)], atol=ROUNDING)
+    compare({name: part for name, (part,) in mesh.cell_data.items()}, scene.bolts(), "bolts.vtu")
 
 
 def test_every_key_of_summary(written):

@@ -50,8 +50,11 @@ def shipped() -> dict[str, tuple[Path, str]]:
     return scenes
 
 
-def load(source: str | Path) -> Scene:
-    """Read a scene of the package by name, or a TOML file. Raises ValueError."""
+def read_source(source: str | Path) -> tuple[str, str, Files]:
+    """Text of a scene of the package by name, or of a TOML file; its name, and the files beside it.
+
+    Raises ValueError.
+    """
     path, variant_line = shipped().get(source, (Path(source), ""))
     if not path.is_file():
         raise ValueError(
@@ -61,7 +64,33 @@ def load(source: str | Path) -> Scene:
         text = variant_line + path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path} is not UTF-8 text: {error}") from None
-    return parse(text, path.name, Files(path.parent))
+    return text, path.name, Files(path.parent)
+
+
+def load(source: str | Path) -> Scene:
+    """Read a scene of the package by name, or a TOML file. Raises ValueError."""
+    return parse(*read_source(source))
+
+
+def is_in_space(data: Tables) -> bool:
+    """Whether tables of a scene describe blocks in space.
+
+    They do if a block or a rock has three coordinates, or a shape that only solids have.
+    """
+
+    def has_three(value: Any) -> bool:
+        if not isinstance(value, list):
+            return False
+        is_point = len(value) == 3 and not isinstance(value[0], list)
+        return is_point or any(map(has_three, value))
+
+    lists = [data.get(kind) for kind in ("block", "rock")]
+    tables = [table for one in lists if isinstance(one, list) for table in one]
+    return any(
+        isinstance(table, dict)
+        and ("file" in table or any(has_three(table.get(key)) for key in ("box", "at", "corners")))
+        for table in tables
+    )
 
 
 def parse(text: str, where: str = "scene", files: Files | None = None) -> Scene:
@@ -108,6 +137,10 @@ def _copy_rocks(rocks: Any, where: str) -> Iterator[Tables]:
 def build(data: Tables, where: str = "scene", files: Files | None = None, text: str = "") -> Scene:
     """Build a scene from the tables of its file and the files that it names. Raises ValueError."""
     files = Files() if files is None else files
+    if is_in_space(data):
+        raise ValueError(
+            f"{where}: blocks with three coordinates are in space: use dem_demo.space.load"
+        )
     top = DEFAULTS | keys.validate_table(data, SCENE, where)
     laws = {
         name: build_law(table, f"{where}: laws.{name}", files)

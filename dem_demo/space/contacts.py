@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled import PointArrays, SolidArrays, address
+from ..contact import ContactRows
 from .solids import Solid
 
 MAX_TILT = np.radians(2.0)  # of two faces in contact
@@ -193,35 +194,38 @@ def turned_from_dip(normal: np.ndarray, degrees: np.ndarray) -> np.ndarray:
     return np.cos(angle) * down + np.sin(angle) * np.cross(upward, down)
 
 
-class Rows(NamedTuple):
-    """How closure and shears of k contact points follow the motions of their blocks.
+def contact_axes(surfaces: Surfaces, points: ContactPoints, axis_2: np.ndarray) -> np.ndarray:
+    """Axes (k, 3, 3) of the law at contact points: normal of block b, axis 2, axis 3.
 
-    closure (k,) in m. axes (k, 3, 3): normal of block b, axis 2, axis 3. kinematics (k, 3, 12): of
-    closure and both shears by the displacement of a, its rotation about its principal axes, and the
-    same of b.
+    axis_2 (k, 3): directions that are projected on the faces of b.
     """
-
-    closure: np.ndarray
-    axes: np.ndarray
-    kinematics: np.ndarray
-
-
-def contact_rows(surfaces: Surfaces, points: ContactPoints, axis_2: np.ndarray) -> Rows:
-    """Rows of contact points at the present places of the blocks.
-
-    axis_2 (k, 3): directions of the law's axis 2 now.
-    """
-    a, b = points.block_a, points.block_b
     normal = surfaces.normal[points.face_b]
     axis_2 = axis_2 - np.einsum("ki,ki->k", axis_2, normal)[:, None] * normal
     axis_2 /= np.linalg.norm(axis_2, axis=1)[:, None]
-    axes = np.stack([normal, axis_2, np.cross(normal, axis_2)], axis=1)
+    return np.stack([normal, axis_2, np.cross(normal, axis_2)], axis=1)
+
+
+def contact_rows(surfaces: Surfaces, points: ContactPoints, axes: np.ndarray) -> ContactRows:
+    """Rows of contact points at the present places of the blocks.
+
+    axes (k, 3, 3): of `contact_axes`. Keys are the two faces, and the number of the point in their
+    contact.
+    """
+    k = len(points.area)
+    normal = axes[:, 0]
     on_face = surfaces.vertex[surfaces.corner[surfaces.first_corner[points.face_b]]]
-    closure = np.einsum("ki,ki->k", on_face - points.point, normal)
     rates = axes * np.array([-1.0, 1.0, 1.0])[:, None]  # of closure and shears by a
     parts = []
-    for block, sign in ((a, 1.0), (b, -1.0)):
+    for block, sign in ((points.block_a, 1.0), (points.block_b, -1.0)):
         arm = points.point - surfaces.position[block]
         turning = np.cross(arm[:, None], rates) @ surfaces.rotation[block]
         parts += [sign * rates, sign * turning]
-    return Rows(closure, axes, np.concatenate(parts, axis=2))
+    rows = ContactRows.zeros(k, dim=3, dof=6, n_keys=3)
+    rows.block_a[:] = points.block_a
+    rows.block_b[:] = points.block_b
+    rows.closure[:] = np.einsum("ki,ki->k", on_face - points.point, normal)
+    rows.area[:] = points.area
+    rows.kinematics[:] = np.concatenate(parts, axis=2)
+    first = np.searchsorted(points.contact, points.contact)
+    rows.keys[:] = points.face_a, points.face_b, np.arange(k) - first
+    return rows

@@ -57,7 +57,8 @@ class Trials:
     Raises ValueError for a folder with trials of another scene.
     """
 
-    def __init__(self, scene: Scene, folder: Path | None = None) -> None:
+    def __init__(self, scene: Any, folder: Path | None = None) -> None:
+        """Read the finished trials of a scene with a `text` and `files`."""
         self.path = folder and folder / TRIALS
         self.header = {
             "version": TRIALS_VERSION,
@@ -210,10 +211,11 @@ def factor_of_safety(
     if bound == 0.0:
         return None
 
-    def reduced(log_factor: float) -> Scene:
-        return weakened(scene, float(np.exp(log_factor)))
+    def solve(log_factor: float, guess: np.ndarray | None) -> np.ndarray | None:
+        reduced = weakened(scene, float(np.exp(log_factor)))
+        return equilibrium_displacements(reduced, guess, is_excluded)
 
-    with _Search(reduced, trials, f"{name}: factor of safety", is_excluded) as search:
+    with LimitSearch(solve, trials, f"{name}: factor of safety") as search:
         if bound is None:
             log_factor = search.upwards(LOG_FACTOR)
         else:
@@ -238,11 +240,11 @@ def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene
     for a tilt beyond 60 degrees.
     """
 
-    def tilted(angle: float) -> Scene:
+    def solve(angle: float, guess: np.ndarray | None) -> np.ndarray | None:
         gravity = rotation(np.radians(angle)) @ scene.gravity
-        return replace(scene, gravity=tuple(gravity))
+        return equilibrium_displacements(replace(scene, gravity=tuple(gravity)), guess)
 
-    with _Search(tilted, trials or Trials(scene), f"{name}: critical tilt") as search:
+    with LimitSearch(solve, trials or Trials(scene), f"{name}: critical tilt") as search:
         return search.upwards(TILT)
 
 
@@ -258,28 +260,26 @@ def weakened(scene: Scene, factor: float) -> Scene:
     return replace(scene, laws=laws, reduction=scene.reduction * factor)
 
 
-class _Search:
-    """Search for the parameter x beyond which the scene `scene_at(x)` has no equilibrium.
+class LimitSearch:
+    """Search for the parameter x beyond which a scene has no equilibrium.
 
-    Each trial looks for the displacements of an equilibrium, starting at those of an earlier trial.
-    trials: finished trials, under `name`. is_excluded (n,): blocks that need no equilibrium. As a
-    context manager it shows progress.
+    solve: function of x and of the displacements of the equilibrium at an earlier x, from which its
+    search starts (None: from the drawing); returns the displacements of the equilibrium at x, None
+    if there is none. trials: finished trials, under `name`. As a context manager it shows progress.
     """
 
     def __init__(
         self,
-        scene_at: Callable[[float], Scene],
+        solve: Callable[[float, np.ndarray | None], np.ndarray | None],
         trials: Trials,
         name: str,
-        is_excluded: np.ndarray | None = None,
     ) -> None:
-        self.scene_at = scene_at
+        self.solve = solve
         self.trials = trials
         self.name = name
-        self.is_excluded = is_excluded
         self.bar = tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False)
 
-    def __enter__(self) -> "_Search":
+    def __enter__(self) -> "LimitSearch":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -342,7 +342,7 @@ class _Search:
         """
         displacements = self.trials.result(
             f"{self.name} {x} from {previous}",
-            lambda: equilibrium_displacements(self.scene_at(x), guess, self.is_excluded),
+            lambda: self.solve(x, guess),
         )
         self.bar.update()
         return None if displacements is None else np.array(displacements)

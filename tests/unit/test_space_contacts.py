@@ -8,6 +8,7 @@ from shapely import Polygon
 from dem_demo.space.contacts import (
     MAX_TILT,
     Surfaces,
+    contact_axes,
     contact_rows,
     dip_line,
     find_contacts,
@@ -27,6 +28,11 @@ def surfaces_of(*solids):
 def contacts_of(*solids, reach=REACH):
     surfaces = surfaces_of(*solids)
     return surfaces, find_contacts(surfaces, np.full(len(solids), reach), 0.1)
+
+
+def rows_of(surfaces, points, axis_2):
+    axes = contact_axes(surfaces, points, np.tile(axis_2, (len(points.area), 1)))
+    return contact_rows(surfaces, points, axes)
 
 
 def move(surfaces, i, displacement, rotation):
@@ -51,7 +57,7 @@ def test_a_box_on_a_box():
         assert points.area == pytest.approx([0.5] * 4, rel=1e-14)
         xy = sorted(points.point[:, :2].round(12).tolist())
         assert xy == [[0.0, -0.8], [0.0, 1.2], [1.0, -0.8], [1.0, 1.2]]
-        rows = contact_rows(surfaces, points, np.tile([1.0, 0.0, 0.0], (4, 1)))
+        rows = rows_of(surfaces, points, [1.0, 0.0, 0.0])
         assert rows.closure == pytest.approx([-gap] * 4, abs=1e-15)
     assert not len(contacts_of(BASE, box([1, 1, 1], [0, 0, 0.503]))[1].area)
     assert not len(contacts_of(BASE, box([1, 1, 1], [3.0, 0, 0.5]))[1].area)
@@ -102,7 +108,7 @@ def test_points_of_tilted_faces_lie_on_face_a(tilt):
         start = np.array([surfaces.ring(face)[0] for face in points.face_a])
         height = np.einsum("ki,ki->k", points.point - start, normal)
         assert np.abs(height).max() < 1e-14
-        rows = contact_rows(surfaces, points, np.tile([0.0, 1.0, 0.0], (4, 1)))
+        rows = rows_of(surfaces, points, [0.0, 1.0, 0.0])
         assert np.ptp(rows.closure) == pytest.approx(np.sin(np.radians(tilt)), rel=0.05)
 
 
@@ -182,8 +188,9 @@ def test_rows_are_the_rates_of_closure_and_shears():
     surfaces, points = contacts_of(*solids)
     k = len(points.area)
     axis_2 = turned_from_dip(surfaces.normal[points.face_b], np.full(k, 30.0))
-    rows = contact_rows(surfaces, points, axis_2)
-    assert rows.axes @ rows.axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (k, 1, 1)))
+    axes = contact_axes(surfaces, points, axis_2)
+    rows = contact_rows(surfaces, points, axes)
+    assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (k, 1, 1)))
     start = [surfaces.position.copy(), surfaces.rotation.copy()]
     motions = 1e-6 * rng.standard_normal((2, 6))  # displacement; rotation about principal axes
     moved = []
@@ -199,7 +206,7 @@ def test_rows_are_the_rates_of_closure_and_shears():
             at.append(surfaces.position[block] + turned)
         moved.append(at[0] - at[1])
     relative = 0.5 * (moved[0] - moved[1])  # of a to b at the points
-    expected = np.einsum("kci,ki->kc", rows.axes, relative) * [-1.0, 1.0, 1.0]
+    expected = np.einsum("kci,ki->kc", axes, relative) * [-1.0, 1.0, 1.0]
     both = np.concatenate([motions[points.block_a], motions[points.block_b]], axis=1)
     assert np.einsum("kcm,km->kc", rows.kinematics, both) == pytest.approx(expected, abs=1e-15)
 

@@ -1,0 +1,102 @@
+"""The keys of a scene in space, each with the rule that its value must satisfy."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from jointlaw.support.checks import integer, number
+
+from ..scene.keys import (
+    DENSITY,
+    FLAG,
+    LIST,
+    MAX_SEISMIC_COEFFICIENT,
+    POSITIVE,
+    TABLE,
+    TEXT,
+    within,
+)
+
+
+def vector(name: str, value: Any) -> np.ndarray:
+    """Require three finite numbers."""
+    if not isinstance(value, list) or len(value) != 3:
+        raise ValueError(
+            f"{name} = {value!r}: must be three numbers [x, y, z], as in all of a scene in space"
+        )
+    return np.array([number(name, one) for one in value])
+
+
+def positive_vector(name: str, value: Any) -> np.ndarray:
+    """Require three numbers above zero."""
+    sides = vector(name, value)
+    if not (sides > 0).all():
+        raise ValueError(f"{name} = {value!r}: its sides must be above 0")
+    return sides
+
+
+def points(name: str, value: Any) -> np.ndarray:
+    """Require a list of points (p, 3) in m, four or more."""
+    rows = [vector(name, point) for point in LIST(name, value)]
+    if len(rows) < 4:
+        raise ValueError(f"{name}: must be 4 corners [x, y, z] or more")
+    return np.array(rows)
+
+
+def seismic_coefficients(name: str, value: Any) -> np.ndarray:
+    """Require three shares of the weight."""
+    shares = vector(name, value)
+    for share in shares.tolist():
+        within(name, share, -MAX_SEISMIC_COEFFICIENT, MAX_SEISMIC_COEFFICIENT,
+               "(shares of the weight; 15 % is 0.15)")  # fmt: skip
+    return shares
+
+
+def not_there_yet(name: str, value: Any) -> Any:
+    """Refuse a key that blocks in the plane have."""
+    raise ValueError(
+        f"{name}: not there yet for blocks in space, which have statics only; leave it out, or "
+        "draw the scene in the plane"
+    )
+
+
+ANGLE = partial(within, low=-360.0, high=360.0, unit="degrees")
+DIP = partial(within, low=0.0, high=90.0, unit="degrees below the horizontal")
+FRACTION = partial(within, low=0.0, high=1.0, unit="")
+REGION = {
+    "box": positive_vector, "at": vector, "corners": points,
+    "dip": DIP, "dip_direction": ANGLE, "through": vector,
+}  # fmt: skip
+SHAPE = {"box": positive_vector, "at": vector, "corners": points, "file": TEXT}
+BLOCK = {
+    "name!": TEXT, **SHAPE, "density": DENSITY, "fixed": FLAG, "load": vector,
+    **dict.fromkeys(("velocity", "spin", "fixed_motions"), not_there_yet),
+}  # fmt: skip
+SET = {
+    "dip!": DIP, "dip_direction!": ANGLE, "spacing!": POSITIVE, "law": TEXT, "through": vector,
+    "persistence": FRACTION, "rough": ANGLE,
+    "scatter": partial(within, low=0, high=0.999, unit="(two joints could meet)"),
+}  # fmt: skip
+ROCK = {
+    "name!": TEXT, **SHAPE, "set!": [SET], "fixed": [REGION], "density": DENSITY,
+    "seed": partial(integer, bound=0), "min_width": POSITIVE, "laws": TABLE,
+    "hole": not_there_yet,
+}  # fmt: skip
+RUN = {
+    "skin": POSITIVE, "max_overlap": POSITIVE,
+    **dict.fromkeys(
+        ("end", "fraction", "step", "settle", "record", "dashpot_normal", "dashpot_shear",
+         "law_steps", "corner_length"),
+        not_there_yet,
+    ),
+}  # fmt: skip
+SCENE = {
+    "title": TEXT, "gravity": vector, "seismic": seismic_coefficients, "density": DENSITY,
+    "law": TEXT, "rough": ANGLE, "laws!": TABLE, "block": [BLOCK], "rock": [ROCK],
+    "joint": [{"between!": LIST, "law!": TEXT, "rough": ANGLE}], "run": RUN,
+    **dict.fromkeys(
+        ("water", "in_situ", "excavate", "drive", "monitor", "thickness", "bolt", "pressure"),
+        not_there_yet,
+    ),
+}  # fmt: skip

@@ -1,0 +1,250 @@
+"""Static equilibrium of blocks in space on virgin joints.
+
+The contacts are found once, at the places as drawn. Displacements of an equilibrium are of the
+order of the closures, so contacts keep their places and normals. The search is the one of the plane
+(`dynamics/search.py`): it reads rows, with six motions of a block and three components of a
+displacement of the law.
+"""
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+import jointlaw as jl
+
+from ..contact import tabulate_first_loading
+from ..contact.joints import stick_response
+from ..dynamics.relaxation import Verdict
+from ..dynamics.search import EquilibriumSearch, StaticSystem
+from .contacts import Surfaces, contact_axes, contact_rows, find_contacts, turned_from_dip
+from .scene import SpaceScene
+
+
+class LawCurve(NamedTuple):
+    """A law and its first-loading curve, by columns (`contact.tabulate_first_loading`)."""
+
+    law: jl.Law
+    curve: dict[str, np.ndarray]
+
+
+class VirginJoints:
+    """Joints of k contact points without history, as the search for an equilibrium reads them.
+
+    law (k,): number of the law of each point. reduction (3,): 1 for the normal stress, and the
+    factor by which shear stresses are divided (see `contact.Joints`). tensile_stiffness (laws,) in
+    Pa/m: of intact bonds.
+    """
+
+    def __init__(self, laws: Iterable[jl.Law], law: np.ndarray, reduction: float) -> None:
+        self.n = len(law)
+        self.law = law
+        self.reduction = np.array([1.0, reduction, reduction])
+        self.by_law = []
+        for one in laws:
+            curve = {**tabulate_first_loading(one)}
+            curve["stiffness"] = one.first_loading_stiffness(curve["closure"], reduction)
+            self.by_law.append(LawCurve(one, curve))
+        self.rows_by_law = [np.flatnonzero(law == i) for i in range(len(self.by_law))]
+        self.tensile_stiffness = np.array([one.law.tensile_stiffness for one in self.by_law])
+        self._batches = [
+            one.law.joints(len(rows), track_dissipation=False)
+            for one, rows in zip(self.by_law, self.rows_by_law, strict=True)
+        ]
+
+    def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, None]:
+        """Tractions (k, 3) in Pa and tangents (k, 3, 3) in Pa/m at displacements d (k, 3) in m."""
+        F = np.zeros((self.n, 3))
+        C = np.zeros((self.n, 3, 3))
+        for batch, rows in zip(self._batches, self.rows_by_law, strict=True):
+            if len(rows):
+                F[rows], C[rows] = batch.trial(d[rows] / self.reduction)
+        return F / self.reduction, C / np.outer(self.reduction, self.reduction), None
+
+    def stick_predictor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tractions (k, 3) and tangents (k, 3, 3) of joints that stick, at d (k, 3) in m."""
+
+        def stress_and_stiffness(closure: np.ndarray) -> np.ndarray:
+            columns = ("stress", "stiffness")
+            return np.array([self.interpolate(name, "closure", closure) for name in columns])
+
+        return stick_response(d, stress_and_stiffness, self.tensile_stiffness[self.law])
+
+    def interpolate(self, column: str, by: str, x: np.ndarray) -> np.ndarray:
+        """A column of the first-loading curves, such as "stress", where column `by` is x (k,)."""
+        out = np.empty(self.n)
+        for one, rows in zip(self.by_law, self.rows_by_law, strict=True):
+            out[rows] = np.interp(x[rows], one.curve[by], one.curve[column])
+        return out
+
+
+class Equilibrium(NamedTuple):
+    """Result of a search.
+
+    verdict; unstable (n,): blocks without static equilibrium. displacement (n, 3) in m, rotation
+    (n, 3): rotation vectors in rad. closure and shears d (k, 3) in m and tractions (k, 3) in Pa of
+    the contact points: normal stress, and shear stresses along axes 2 and 3. unbalanced_ratio: the
+    largest unbalanced force of the other blocks over their weight.
+    """
+
+    verdict: Verdict
+    unstable: np.ndarray
+    displacement: np.ndarray
+    rotation: np.ndarray
+    d: np.ndarray
+    traction: np.ndarray
+    unbalanced_ratio: float
+
+
+class Statics:
+    """The blocks of a scene as drawn, their contacts and the law of each contact point.
+
+    surfaces, points, axes, rows: geometry of the contacts (`contacts.py`); law (k,): numbers of the
+    laws. mass (n,) in kg; weight (n, 3) in N: gravity, seismic and other forces; is_free (n,).
+
+    Raises ValueError for blocks that overlap as drawn.
+    """
+
+    def __init__(self, scene: SpaceScene) -> None:
+        self.scene = scene
+        blocks = scene.blocks
+        self.is_free = np.array([not block.fixed for block in blocks])
+        self.surfaces = Surfaces([block.solid for block in blocks], self.is_free)
+        self._require_apart()
+        self.points = find_contacts(self.surfaces, scene.skins, scene.max_overlap)
+        self.law, axis_2 = self._laws_and_axes()
+        self.axes = contact_axes(self.surfaces, self.points, axis_2)
+        self.rows = contact_rows(self.surfaces, self.points, self.axes)
+        density = np.array([block.density for block in blocks])
+        self.mass = density * self.surfaces.volume
+        self.inertia = density[:, None] * self.surfaces.moments
+        loads = np.array([block.load for block in blocks])
+        self.weight = self.mass[:, None] * scene.acceleration + loads
+
+    def _require_apart(self) -> None:
+        """Require that no blocks overlap by more than their skins. Raises ValueError."""
+        skins = self.scene.skins
+        pairs = self.surfaces.near_pairs(np.zeros(len(skins)))
+        allowed = skins[pairs].min(axis=1)
+        depth = -self.surfaces.separations(pairs, float(allowed.min(initial=np.inf)))
+        for a, b in pairs[depth > allowed][:1].tolist():
+            names = [self.scene.blocks[i].name for i in (a, b)]
+            worst = float(depth[(pairs == [a, b]).all(axis=1)][0])
+            raise ValueError(
+                f"blocks {names[0]!r} and {names[1]!r} overlap by {worst:.3g} m as drawn, more "
+                "than the range of contact detection: move one, or set a larger run.skin"
+            )
+
+    def _laws_and_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the law (k,) of each contact point, and its axis 2 (k, 3).
+
+        A `[[joint]]` table of both blocks comes first, then the set of the face of b, then the set
+        of the face of a, then the defaults of the scene.
+        """
+        scene, points, surfaces = self.scene, self.points, self.surfaces
+        names = [*scene.laws]
+        number = {name: i for i, name in enumerate(names)} | {None: -1}
+        law_of_face = np.array([number[law] for block in scene.blocks for law in block.face_laws])
+        axis_of_face = np.concatenate([block.face_axes for block in scene.blocks])
+        face = points.face_b
+        face = np.where(law_of_face[face] < 0, points.face_a, face)
+        law = law_of_face[face]
+        axis_2 = axis_of_face[face]
+        is_default = law < 0
+        angle = np.full(len(law), scene.rough)
+        law[is_default] = number[scene.default_law]
+        for pair, (name, degrees) in scene.pairs.items():
+            low, high = sorted(pair)
+            is_pair = (points.block_a == low) & (points.block_b == high)
+            law[is_pair], angle[is_pair] = number[name], degrees
+            is_default |= is_pair
+        normal = surfaces.normal[points.face_b]
+        axis_2[is_default] = turned_from_dip(normal[is_default], angle[is_default])
+        return law, axis_2
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Motion (n, 6) of a block per unit of a scaled motion; zero for fixed blocks."""
+        inertia = np.concatenate([np.repeat(self.mass[:, None], 3, axis=1), self.inertia], axis=1)
+        return self.is_free[:, None] / np.sqrt(inertia)
+
+    def search(
+        self, scene: SpaceScene | None = None, excluded: np.ndarray | None = None
+    ) -> EquilibriumSearch:
+        """The search for an equilibrium with the laws and the reduction of a scene.
+
+        scene: with other laws than the own scene, such as weakened ones. excluded (n,): blocks that
+        have moved away, so their contacts bear nothing.
+        """
+        scene = scene or self.scene
+        rows = self.rows
+        joints = VirginJoints(scene.laws.values(), self.law, scene.reduction)
+        start = np.zeros((len(rows.area), 3))
+        start[:, 0] = rows.closure
+        of_blocks = np.concatenate([self.scale[rows.block_a], self.scale[rows.block_b]], axis=1)
+        area = rows.area
+        if excluded is not None:
+            area = np.where(excluded[rows.block_a] | excluded[rows.block_b], 0.0, area)
+        moments = np.zeros_like(self.weight)
+        return EquilibriumSearch(
+            StaticSystem(
+                self.mass,
+                self.surfaces.radius,
+                np.repeat(self.is_free[:, None], 6, axis=1),
+                self.scale,
+                np.concatenate([self.weight, moments], axis=1) * self.is_free[:, None],
+                rows.block_a,
+                rows.block_b,
+                rows.kinematics * of_blocks[:, None],
+                area,
+                start,
+                joints,
+            )
+        )
+
+    def solve(self, scene: SpaceScene | None = None) -> Equilibrium:
+        """Find the equilibrium with the laws and the reduction of a scene, and the blocks that have
+        none."""
+        search = self.search(scene)
+        none = np.zeros(len(self.mass), bool)
+        solution = search.solve(search.stick_predictor(), none)
+        verdict = solution.verdict
+        if verdict is Verdict.EQUILIBRIUM and solution.unstable.any():
+            verdict = Verdict.NO_EQUILIBRIUM
+        y = solution.displacement
+        motion = search.expand(y) * self.scale
+        d = (search.start + search.kinematics @ y).reshape(3, -1).T
+        unbalanced = search.expand(search._unbalanced(y)[0] / search.root)
+        size = np.hypot(
+            np.linalg.norm(unbalanced[:, :3], axis=1),
+            np.linalg.norm(unbalanced[:, 3:], axis=1) / self.surfaces.radius,
+        )
+        is_stable = self.is_free & ~solution.unstable
+        weight = np.maximum(np.linalg.norm(self.weight, axis=1), 1e-300)
+        return Equilibrium(
+            verdict,
+            solution.unstable,
+            motion[:, :3],
+            np.einsum("nij,nj->ni", self.surfaces.rotation, motion[:, 3:]),
+            d,
+            search.joints.trial(d)[0],
+            float((size / weight)[is_stable].max(initial=0.0)),
+        )
+
+    def displacements(
+        self,
+        scene: SpaceScene,
+        guess: np.ndarray | None = None,
+        excluded: np.ndarray | None = None,
+    ) -> np.ndarray | None:
+        """Displacements (m,) of the free motions in equilibrium, None where none is found.
+
+        guess: displacements of a similar scene from which the search starts, by default the stick
+        predictor; excluded (n,): blocks that need no equilibrium.
+        """
+        search = self.search(scene, excluded)
+        known = np.zeros(len(self.mass), bool) if excluded is None else excluded
+        start = search.stick_predictor() if guess is None else guess
+        solution = search.solve(start, known, name_unstable=False)
+        return solution.displacement if solution.verdict is Verdict.EQUILIBRIUM else None

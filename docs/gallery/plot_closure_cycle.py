@@ -4,6 +4,8 @@ Closure and unloading
 
 Inclined asperities slide as the joint closes, and stick at first as it opens: hysteresis without
 plastic contact. Where asperities yield, the loop is larger, and a part of the closure is permanent.
+
+`Close and open this rock in the browser <../browser.html#rock=westerly-smooth&play=closure>`__.
 """
 
 from dataclasses import replace

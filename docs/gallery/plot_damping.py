@@ -3,6 +3,8 @@ Damping against amplitude
 =========================
 
 Damping ratio and secant stiffness of small cyclic shear, as in earthquake engineering.
+
+`Shear this rock to and fro in the browser <../browser.html#rock=westerly-smooth&play=cycle>`__.
 """
 
 from dataclasses import replace

@@ -4,6 +4,8 @@ Direct shear: CNL, CNS, constant closure
 
 At a constant normal load (CNL) a joint dilates freely. At a constant normal stiffness (CNS) of the
 surrounding rock dilation increases the normal stress, and the joint becomes stronger.
+
+`Shear this rock in the browser <../browser.html#rock=biegel-rough&play=shear>`__.
 """
 
 import math

@@ -5,6 +5,9 @@ Loss of interlock with slip
 Post-peak softening: the friction angle is the friction angle of the asperities plus the dilation
 angle. With slip from the interlocked (mated) position the dilation decays, and the strength with
 it.
+
+`Shear a joint to and fro in the browser, and change its mating length
+<../browser.html#rock=westerly-rough&play=cycle>`__.
 """
 
 from dataclasses import replace

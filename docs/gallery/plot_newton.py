@@ -3,6 +3,8 @@ The tangent in a Newton solve
 =============================
 
 A block between two joints is loaded in shear: where is its equilibrium?
+
+`Shear this rock and open it in the browser <../browser.html#rock=biegel-rough&play=opening>`__.
 """
 
 import matplotlib.pyplot as plt

@@ -3,6 +3,9 @@ Path dependence: snapshot, restore, checkpoint
 ==============================================
 
 The traction depends on the path; a snapshot contains the whole state, in memory or in a file.
+
+`Turn the direction of slip of this rock in the browser
+<../browser.html#rock=westerly-rough&step=6>`__.
 """
 
 import tempfile

@@ -4,6 +4,8 @@ Export a table, and compare it with the law
 
 A host that needs stiffnesses and friction instead of a law can read a table, which is not
 path-dependent.
+
+`Shear this rock in the browser <../browser.html#rock=jing-replica&play=shear>`__.
 """
 
 import tempfile

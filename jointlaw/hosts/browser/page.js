@@ -1,5 +1,7 @@
 /* The page: controls, pointer, address. */
 
+const TOUCH_GEAR = 0.4; // block over finger, relative to block over mouse
+let pointer = "mouse"; // the kind that was used last
 let exports, test, numbers, simpler = [], playing = null, drawn = false, spin = -0.6, resting = 0;
 const story = new Story();
 const MATINGS = [0.5, 1, 2, 3, 5, 8, 12, 20, 40, Infinity]; // mating length in closures at 10 MPa
@@ -18,9 +20,10 @@ function redraw() {
 function draw() {
   drawn = false;
   readColours();
-  story.look(test);
-  const facets = test.joint.facetStates(), mark = story.step && !story.isDone ? story.step.mark : "";
-  drawScene(test, facets, numbers.mating, mark);
+  const facets = test.joint.facetStates();
+  story.observe(test, facets);
+  const mark = story.step && !story.isDone ? story.step.mark : "";
+  drawScene(test, facets, numbers.mating, mark, gear());
   drawCurves(test, simpler);
   drawHemisphere(test, facets, numbers.a, spin);
   showNumbers();
@@ -70,12 +73,31 @@ function showStory() {
   const { step, at, isDone } = story;
   if (!step) return;
   part("step").textContent = `${at + 1} of ${STORY.length}: ${step.name}. `;
-  part("explanation").textContent = step.explanation;
-  part("task").textContent = isDone ? `Done. ${at + 1 < STORY.length ? "Continue." : "The tutorial is complete: now try the parameters of the joint."}` : step.task;
-  part("next").disabled = at + 1 === STORY.length;
+  part("explanation").textContent = isDone ? `${story.verdict} ${step.explanation}`.trim() : step.question;
+  part("choices").hidden = isDone;
+  showChoices(step);
+  const isLast = at + 1 === STORY.length;
+  part("task").textContent = isDone ? (isLast ? "Done. The tutorial is complete: now try the parameters of the joint." : "Done. Continue with Next.") : step.task;
+  part("next").disabled = isLast;
   part("back").disabled = at === 0;
   for (const place of document.querySelectorAll("#joint .highlighted")) place.classList.remove("highlighted");
   for (const name of isDone ? ["next"] : step.highlighted) part(name).classList.add("highlighted");
+}
+
+/* Buttons with the possible answers to the question of a step */
+function showChoices(step) {
+  const place = part("choices");
+  if (place.dataset.step !== step.name) {
+    place.dataset.step = step.name;
+    place.replaceChildren(...step.choices.map((choice, i) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = choice;
+      button.onclick = () => (story.predict(i), redraw());
+      return button;
+    }));
+  }
+  [...place.children].forEach((button, i) => button.setAttribute("aria-pressed", String(story.prediction === i)));
 }
 
 // ------------------------------------------------------------------------------------- actions
@@ -94,6 +116,7 @@ function guarded(what) {
 /* A new joint of this rock with these parameters, loaded by these legs */
 function rebuild(legs) {
   playing = null;
+  if (!story.isDone) story.begin(); // what it has seen was of another joint
   const { degrees, hold } = test || { degrees: 0, hold: "stress" };
   guarded(() => {
     const created = new Test(new Joint(exports, tablesOf(rock(), numbers)));
@@ -118,6 +141,19 @@ function legsFor([stress, ...slips]) {
   for (const [x, y] of slips)
     legs.push({ ...legs[0], d: [0, x * length, y * length], steps: Math.ceil(100 * Math.hypot(x, y)) });
   return legs;
+}
+
+/* A new joint, loaded for a step of the tutorial along direction 0 */
+function loadFor(before) {
+  if (test) (test.degrees = 0), (test.hold = "stress");
+  rebuild(legsFor(before));
+}
+
+/* Go to a step of the tutorial */
+function goTo(at) {
+  playing = null;
+  story.go(at, test, loadFor);
+  redraw();
 }
 
 /* Update the curves of Coulomb and Barton-Bandis for this stress and direction */
@@ -185,9 +221,9 @@ function listen() {
   });
   part("level").oninput = () => setLevel(part("level").value / 400);
   for (const button of document.querySelectorAll("#joint [data-test]")) button.onclick = () => play(button.dataset.test);
-  const again = (before) => rebuild(legsFor(before));
-  part("next").onclick = () => (story.go(story.at + 1, again), redraw());
-  part("back").onclick = () => (story.go(story.at - 1, again), redraw());
+  part("next").onclick = () => goTo(story.at + 1);
+  part("back").onclick = () => goTo(story.at - 1);
+  part("again").onclick = () => (story.begin(), loadFor(story.step ? story.step.before : [10]));
   part("python").onclick = () => give(python(rockName(), numbers, test), "jointlaw.py", "This law and path in Python");
   part("csv").onclick = () => give(csv(test), "joint.csv", "All steps");
   part("link").onclick = () => (rest(), give(location.href, "", "The address of this joint"));
@@ -202,6 +238,7 @@ function listen() {
 function follow(place, act) {
   let from = null;
   place.onpointerdown = (event) => {
+    pointer = event.pointerType;
     from = null; // a second finger ends the drag
     if (!event.isPrimary || event.button !== 0) return;
     from = event;
@@ -215,8 +252,9 @@ function follow(place, act) {
   place.onpointerup = place.onpointercancel = () => (from = null);
 }
 
-/* Motion of the block over motion of the pointer */
-const gear = () => (story.step && !story.isDone && story.step.gear) || 1;
+/* Motion of the block over motion of the pointer: of the step, until the next one. A finger is as wide
+ * as the picture's range of slips, so without a step it moves the block less than a mouse does */
+const gear = () => (story.step ? story.step.gear : 1) * (pointer === "touch" ? TOUCH_GEAR : 1);
 const hand = (x, y) => drag((gear() * x) / zoomOf(test), (gear() * y) / zoomOf(test));
 const turnHemisphere = (x) => ((spin += x / 80), redraw());
 
@@ -224,7 +262,8 @@ function key(event) {
   const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }, way = ways[event.key];
   if (!way || (test.hold === "stress" && way[1])) return; // the page scrolls
   event.preventDefault();
-  drag((way[0] * test.joint.length) / 20, (way[1] * test.joint.length) / 20);
+  const size = test.joint.length * Math.min(1 / 20, story.step ? story.step.gear : 1);
+  drag(way[0] * size, way[1] * size);
 }
 
 /* Copy a text, or show it if the browser does not allow copying; offer it as a file */
@@ -239,22 +278,24 @@ async function give(text, file, name) {
   part("copied-name").textContent = copied ? `${name}: copied` : name;
 }
 
-/* Restore the joint from the address, or start the tutorial */
+/* Restore the joint from the address, play the test or start the step of the tutorial that it names, or
+ * start the tutorial */
 function restoreFromAddress() {
-  const told = new URLSearchParams(location.hash.slice(1));
-  if (told.get("rock") in JOINTLAW.rocks) part("preset").value = told.get("rock");
+  const address = new URLSearchParams(location.hash.slice(1));
+  if (address.get("rock") in JOINTLAW.rocks) part("preset").value = address.get("rock");
   begin();
   try {
     for (const name of ["a", "c", "mu", "mating"]) {
-      const value = Number(told.get(name) || "nothing");
+      const value = Number(address.get(name) || "nothing");
       if (value >= { a: 1, c: -1, mu: 0, mating: 0 }[name]) numbers[name] = value;
     }
-    if (told.has("path")) {
-      const legs = legsOfText(told.get("path"));
+    if (address.has("path")) {
+      const legs = legsOfText(address.get("path"));
       rebuild(legs.length ? legs : legsFor([10]));
-      test.turn(Number(told.get("turn")) || 0);
-      if (told.get("hold") === "closure") test.hold = "closure";
-    } else story.go(0, (before) => rebuild(legsFor(before)));
+      test.turn(Number(address.get("turn")) || 0);
+      if (address.get("hold") === "closure") test.hold = "closure";
+    } else if (address.get("play") in PLAYED) play(address.get("play"));
+    else goTo((Number(address.get("step")) || 1) - 1);
   } catch (error) {
     begin();
     test.message = `The address is not valid (${error.message}); this is a new joint.`;

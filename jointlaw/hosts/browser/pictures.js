@@ -212,8 +212,9 @@ function chooseTeeth(test, count) {
 
 /* Draw the two faces. Below, each ramp has the inclination of its facet, and ends where its dilation has decayed;
  * above, a tip hangs over each. Gaps, slip and closure of the law are enlarged by the same
- * factor; a tip in contact overlaps its ramp. mark: a state to highlight */
-function drawScene(test, facets, mating, mark) {
+ * factor; a tip in contact overlaps its ramp. mark: a state to highlight;
+ * gear: motion of the block over motion of the pointer */
+function drawScene(test, facets, mating, mark, gear) {
   const { c, wide, high } = canvas("scene"), { count, pitch, zoom } = frame(test);
   const { along, slip, at } = test, R = Math.min(9, pitch / 9), half = pitch / 2;
   const across = [at[1] - slip * along[0], at[2] - slip * along[1]]; // slip normal to the picture
@@ -282,7 +283,9 @@ function drawScene(test, facets, mating, mark) {
   c.fillStyle = colours.ink;
   c.textAlign = "center";
   c.textBaseline = "middle";
-  c.fillText(test.hold === "stress" ? "◄ drag this block ►" : "◄ ▲ drag this block ▼ ►", wide / 2 + slip * zoom, 14);
+  const slowed = gear < 0.9 ? ` (slowed ${three(1 / gear)} times)` : "";
+  const label = test.hold === "stress" ? `◄ drag this block${slowed} ►` : `◄ ▲ drag this block${slowed} ▼ ►`;
+  c.fillText(label, wide / 2 + slip * zoom, 14);
   const [per, unit] = scale(test.joint.length), bar = niceStep((40 / zoom) * per, 1);
   c.fillRect(10, high - 8, (bar / per) * zoom, 3); // of the displacements
   c.textAlign = "left";

@@ -35,17 +35,34 @@ def peak_and_last(stress: Array) -> Array:
     return np.array([np.max(np.abs(stress)), abs(stress[-1])])
 
 
-def envelope_strength(name: str, curves: Sequence[ShearCurve], normal: float) -> Array:
-    """Peak and last shear stress (2,) in Pa by an envelope fitted to tests (least squares).
+def normal_at_peak_and_last(curve: ShearCurve) -> Array:
+    """The normal stress (2,) in Pa at the row of the largest shear stress, and at the last row.
+
+    Under constant normal stiffness dilation raises the normal stress, and the strength belongs to
+    the normal stress of its own row, not to the mean.
+    """
+    normal = np.broadcast_to(curve.normal, curve.shear.shape)
+    return np.array([normal[np.argmax(np.abs(curve.shear_stress))], normal[-1]])
+
+
+def envelope_strength(name: str, curves: Sequence[ShearCurve], normal: Any) -> Array:
+    """Peak and last shear stress (2,) in Pa by envelopes fitted to tests (least squares).
+
+    The envelope of peaks is fitted to the largest shear stress of each test and the normal stress
+    in its row, the envelope of last stresses to both in the last row.
 
     Parameters
     ----------
     name: one of `ENVELOPES`.
     curves: two or more tests to fit.
-    normal: normal stress in Pa of the result.
+    normal: normal stress in Pa of the result; (2,) at the peak and at the last row, or one number.
     """
     envelope = ENVELOPES[name]
-    s = np.array([np.mean(curve.normal) for curve in curves])
+    normal = np.broadcast_to(normal, 2)
+    s = np.stack([normal_at_peak_and_last(curve) for curve in curves])
     tau = np.stack([peak_and_last(curve.shear_stress) for curve in curves])
-    slope, intercept = np.polyfit(envelope.x(s), envelope.y(s[:, None], tau), 1)
-    return np.asarray(envelope.inverse(normal, slope * envelope.x(normal) + intercept))
+    strengths = []
+    for k in range(2):
+        line = np.polyfit(envelope.x(s[:, k]), envelope.y(s[:, k], tau[:, k]), 1)
+        strengths.append(envelope.inverse(normal[k], np.polyval(line, envelope.x(normal[k]))))
+    return np.array(strengths)

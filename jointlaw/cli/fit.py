@@ -12,7 +12,12 @@ import numpy as np
 from .. import presets
 from ..calibration import datasets
 from ..calibration.aperture import FlowConditions, FlowFit, fit_flow, read_flow
-from ..calibration.envelopes import ENVELOPES, envelope_strength, peak_and_last
+from ..calibration.envelopes import (
+    ENVELOPES,
+    envelope_strength,
+    normal_at_peak_and_last,
+    peak_and_last,
+)
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
@@ -305,7 +310,7 @@ def _report_predictions(fit: Fit, fitted: list[ShearCurve], predicted: list[Shea
     rows = []
     for curve, test in zip(predicted, fit.predict_shear(*predicted), strict=True):
         measured = peak_and_last(curve.shear_stress)
-        normal = float(np.mean(curve.normal))
+        normal = normal_at_peak_and_last(curve)
         predictions = [peak_and_last(test.stress)]
         predictions += [envelope_strength(form, fitted, normal) for form in ENVELOPES]
         cells = [curve.name, "{:.4g}, {:.4g}".format(*(measured / 1e6))]

@@ -8,7 +8,7 @@ import pytest
 
 from jointlaw.calibration import datasets
 from jointlaw.calibration.datasets import load, names, read_closure, read_peaks, read_shear
-from jointlaw.calibration.envelopes import envelope_strength
+from jointlaw.calibration.envelopes import envelope_strength, normal_at_peak_and_last
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve, first_loading
 
 U = np.array([0.0, 0.05, 0.1, 0.2, 0.5, 1.0])  # mm
@@ -415,6 +415,21 @@ def test_envelope_reproduces_strengths_of_its_own_form(name, strength):
     assert peak == pytest.approx(strength(4e6), rel=1e-9)
     # Barton's form times 0.8 has another form
     assert residual == pytest.approx(0.8 * strength(4e6), rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["Coulomb", "Barton", "power law"])
+def test_envelopes_of_a_coulomb_joint_under_constant_stiffness(name):
+    """Dilation raises the normal stress five times: every row is on the line of Coulomb."""
+    shear = np.linspace(0.0, 1e-2, 50)
+    tests = []
+    for initial in (0.5e6, 1e6, 2e6, 4e6):
+        normal = initial * (1 + 400 * shear)
+        tests.append(ShearCurve(shear, 0.7 * normal * np.minimum(1.0, shear / 1e-3), normal))
+    predicted = tests.pop(2)
+    rows = normal_at_peak_and_last(predicted)
+    np.testing.assert_allclose(rows, 10e6)
+    strength = envelope_strength(name, tests, rows)
+    np.testing.assert_allclose(strength, 7e6, rtol=1e-9)
 
 
 THOUSANDS = "us [mm]\ttau [kPa]\n0.0\t0\n0.1\t875\n0.2\t1,201\n0.3\t1,305\n"

@@ -1,6 +1,6 @@
 """How often the 95 % intervals and bands of fits of shear tests contain the true values.
 
-    python docs/measure/coverage.py [--draws 40] [--case "white noise"] [--results FILE]
+    python docs/measure/coverage.py [--draws 10] [--case "white noise"] [--results FILE]
 
 Direct shear tests of a known law, with opening, and with the noise of each case; free are mu, a and
 mating_length. Columns: draws whose interval of a parameter contains the true value; draws whose
@@ -50,6 +50,7 @@ class Case:
     autocorrelation: of neighbouring deviates.
     spread: standard deviation of ln(mu) and ln(a) between specimens.
     changes: of the true law.
+    draws: number of draws, without the option --draws.
     """
 
     points: int
@@ -58,14 +59,15 @@ class Case:
     autocorrelation: float = 0.0
     spread: float = 0.0
     changes: dict[str, float] = field(default_factory=dict)
+    draws: int = 40
 
 
 CASES = {
     "three points": Case(3),
     "white noise": Case(15),
     "autocorrelated": Case(30, autocorrelation=0.9),
-    "specimens": Case(14, (1e6, 2e6, 4e6), noise=0.01, spread=0.06),
-    "degradation": Case(15, noise=0.01, changes={"slope_wear": 4e3}),
+    "specimens": Case(14, (1e6, 2e6, 4e6), noise=0.01, spread=0.06, draws=100),
+    "degradation": Case(15, noise=0.01, changes={"slope_wear": 4e3}, draws=20),
 }
 
 
@@ -137,13 +139,14 @@ def draw_tests(case, law, paths, rng):
     return curves
 
 
-def coverage(draws=40, case="", results=""):
-    """Print the table of all cases, or of one."""
+def coverage(draws=0, case="", results=""):
+    """Print the table of all cases, or of one; draws = 0 takes the number of each case."""
     finished = read_draws(results)
     rows = []
     for name in [case] if case else CASES:
-        hits = np.sum(cover(name, draws, finished, results), axis=0)
-        rows.append([name, *(f"{count}/{draws}" for count in hits)])
+        number = draws or CASES[name].draws
+        hits = np.sum(cover(name, number, finished, results), axis=0)
+        rows.append([name, *(f"{count}/{number}" for count in hits)])
     head = ["case", *(f"`{name}`" for name in TRUE_PARAMETERS)]
     for stress in PREDICTED_STRESSES:
         head += [f"peak at {stress / 1e6:g} MPa", f"opening at {stress / 1e6:g} MPa"]

@@ -10,6 +10,8 @@
     envelopes       Coulomb, Barton and a power law fitted to the same tests
     problem         free and fixed parameters, initial values; least squares with priors
     estimates       the result: law, intervals, parameters not identifiable
+    comparison      measured points beside the law and its band: counts, CSV, quality of a fit
+    meaning         spacing of asperities, closure, stiffness and contact of a law
     fit             fit_curves; report and figure of the result
     field           a law from JRC, JCS, a friction angle and a stiffness
 

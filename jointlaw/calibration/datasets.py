@@ -15,6 +15,7 @@
 """
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -219,7 +220,8 @@ def read_closure(
     _require_sign(s[peak_row] > 0, columns[0], load, "has compression negative", table)
     closes = u[peak_row] >= u[0]
     _require_sign(closes, columns[1], CLOSURE, "falls while the stress rises", table)
-    source = _describe_columns(load=columns[0], closure=columns[1])
+    load_name = "normal stress" if area is None else "normal force"
+    source = _describe_columns({load_name: columns[0], "closure": columns[1]})
     if area is not None:
         s = s / area
         notes.append(f"stress is force over an area of {1e4 * area:.6g} cm2")
@@ -246,10 +248,15 @@ def _require_area(
         raise ValueError(f"{table.name}: has stresses, not forces: leave {option} out")
 
 
-def _describe_columns(**columns: Column) -> str:
+def _describe_columns(columns: Mapping[str, Column]) -> str:
     """Which column was read as which quantity, for a report."""
-    parts = (f"{column.title} is {name.replace('_', ' ')}" for name, column in columns.items())
-    return ", ".join(parts)
+    return "; ".join(f"{name}: {_title_with_unit(column)}" for name, column in columns.items())
+
+
+def _title_with_unit(column: Column) -> str:
+    """The title of a column, with its unit from a row of units."""
+    is_in_title = not column.unit or column.unit in column.title
+    return column.title if is_in_title else f"{column.title} [{column.unit}]"
 
 
 def read_shear(path: str | Path, decimal: str | None = None, **options: Any) -> list[ShearCurve]:
@@ -301,7 +308,16 @@ def _shear_test(
     complete = table.complete_rows([*columns.values(), *gauges[1:]], outliers)
     readings = dict(zip(columns, complete.values, strict=False))
     notes = complete.notes
-    source = _describe_columns(**columns)
+    kind = "force" if has_forces else "stress"
+    descriptions = {
+        "shear": "shear displacement",
+        "stress": f"shear {kind}",
+        "normal": f"normal {kind}",
+        "opening": "opening",
+    }
+    described = {descriptions[name]: column for name, column in columns.items()}
+    described |= {f"opening {k}": gauge for k, gauge in enumerate(gauges[1:], 2)}
+    source = _describe_columns(described)
     if len(gauges) > 1:
         readings["opening"], note = _mean_of_gauges(gauges, complete.values[-len(gauges) :])
         notes.append(note)

@@ -266,19 +266,22 @@ class Estimates:
         """Simulate tests with the fitted law."""
         return simulate_curves(curves, self.parameters, self.problem.settings)
 
-    def band(self, closure: ArrayLike) -> Array:
+    def band(self, closure: ArrayLike, of_specimen: bool = False) -> Array:
         """95 % confidence band (2, n), low and high, in Pa of the curve `predict`.
 
         It follows from the covariance of the parameters. It is no prediction band: the noise of a
         further point is not included. Beyond the largest fitted closure it is wider by
         `extrapolation_error`.
 
+        Parameters
+        ----------
         closure: in m, (n,), with the origin of the closure test.
+        of_specimen: whether the band is of one specimen, wider by the spread between specimens.
         """
         u = np.atleast_1d(np.asarray(closure, float))
         settings = self.problem.settings
         low, high = self._confidence_band(
-            lambda values: log_stress(values, values["preload_closure"] + u, settings)
+            lambda values: log_stress(values, values["preload_closure"] + u, settings), of_specimen
         )
         centre = (low + high) / 2
         half_width = np.hypot((high - low) / 2, self.extrapolation_error(u))
@@ -331,14 +334,30 @@ class Estimates:
             float(curve.closure[-1]),
         )
 
-    def shear_band(self, curve: ShearCurve) -> Array:
+    def shear_band(self, curve: ShearCurve, of_specimen: bool = False) -> Array:
         """95 % confidence bands of shear stress (Pa) and opening (m) of a test.
 
         The band of the stress is that of arcsinh(stress/small), which is a logarithm for large
         stresses and allows small ones to change their sign. The opening, a sum of dilation and
         compression, may have any sign: its band is linear.
 
+        Parameters
+        ----------
+        curve: the test.
+        of_specimen: whether the band is of one specimen, wider by the spread between specimens.
+
         Returns low and high of each, (2, 2, rows).
+        """
+        if curve not in self._linear_tests:
+            self._linear_tests[curve] = self._linear_test(curve)
+        small, centre, J = self._linear_tests[curve]
+        half_width = self._half_width(J, of_specimen)
+        stress, opening = np.stack([centre - half_width, centre + half_width]).swapaxes(0, 1)
+        return np.stack([small * np.sinh(stress), opening])
+
+    def _linear_test(self, curve: ShearCurve) -> tuple[float, Array, Array]:
+        """The stress that is small, and arcsinh(stress/small) and opening (2, rows) of a test with
+        their derivative (2, rows, p).
         """
 
         def model(values: Values) -> Array:
@@ -347,15 +366,38 @@ class Estimates:
 
         (fitted,) = self.predict_shear(curve)
         small = max(SMALL_STRESS * float(np.max(np.abs(fitted.stress))), 1e-300)
-        stress, opening = self._confidence_band(model).swapaxes(0, 1)
-        return np.stack([small * np.sinh(stress), opening])
+        return small, model(self.parameters), self._derivative(model)
 
-    def _confidence_band(self, model: Callable[[Values], Array]) -> Array:
+    @cached_property
+    def _linear_tests(self) -> dict[ShearCurve, tuple[float, Array, Array]]:
+        """The tests that `shear_band` was asked for, see `_linear_test`."""
+        return {}
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation (p, p) of the free parameters, after their transforms."""
+        errors = np.sqrt(np.diag(self.solution.covariance))
+        return np.asarray(self.solution.covariance / np.outer(errors, errors))
+
+    def _confidence_band(
+        self, model: Callable[[Values], Array], of_specimen: bool = False
+    ) -> Array:
         """The 95 % confidence band, low and high, of a function of the parameters."""
+        centre = model(self.parameters)
+        half_width = self._half_width(self._derivative(model), of_specimen)
+        return np.stack([centre - half_width, centre + half_width])
+
+    def _derivative(self, model: Callable[[Values], Array]) -> Array:
+        """Derivative (..., p) of a function of the parameters at their estimate."""
         unpack = self.problem.unpack
         bounds = self.problem.bounds()
-        J = central_differences(lambda x: model(unpack(x)), self.solution.x, *bounds)
-        variance = np.einsum("...p,pq,...q->...", J, self.solution.covariance, J)
-        centre = model(self.parameters)
-        half_width = QUANTILE * np.sqrt(variance)
-        return np.stack([centre - half_width, centre + half_width])
+        return central_differences(lambda x: model(unpack(x)), self.solution.x, *bounds)
+
+    def _half_width(self, J: Array, of_specimen: bool) -> Array:
+        """Half-width (...) of the 95 % band of a function with the derivative J (..., p)."""
+        covariance = self.solution.covariance
+        if of_specimen and self.solution.noise.has_specimens:
+            spread = self.solution.noise.mean.spread
+            covariance = covariance + np.diag(spread**2 * self.problem.varies)
+        variance = np.einsum("...p,pq,...q->...", J, covariance, J)
+        return np.asarray(QUANTILE * np.sqrt(variance))

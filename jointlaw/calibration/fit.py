@@ -13,8 +13,10 @@ from ..support.checks import Array
 from ..support.markdown import table
 from ..support.progress import track
 from ..support.pyplot import escape_math, pyplot, style, written
+from .comparison import Comparison, compare, describe_quality
 from .estimates import CURVE_QUANTITIES, Estimates
 from .forward import log_stress
+from .meaning import describe
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
 from .problem import build_problem, solve, staged_starts, starting_points
@@ -60,9 +62,17 @@ OPENING_RANGE = (
 class Fit(Estimates):
     """Result of `fit_curves`: `Estimates`, with a report and a figure."""
 
-    def report(self) -> str:
-        """The fit in words and tables (Markdown)."""
-        lines = ["# Fit of the joint law", "", *self._parameter_table()]
+    def report(self, specimen_size: float | None = None) -> str:
+        """The fit in words and tables (Markdown).
+
+        specimen_size: edge of the specimen in m, which the spacing of asperities is compared with;
+            None takes 100 mm.
+        """
+        lines = ["# Fit of the joint law", "", describe_quality(self.comparisons())]
+        if any(self.shape_differs):
+            names = "; ".join(compress(self.series_names, self.shape_differs))
+            lines += ["", f"**{names} has another shape than the law.** {SHAPE_DIFFERS}"]
+        lines += ["", "## Parameters", "", *self._parameter_table()]
         if any(self.shape_differs):
             lines += ["", f"**{TOO_NARROW}**"]
         lines += ["", FIXED.format(self._fixed_parameters())]
@@ -74,16 +84,45 @@ class Fit(Estimates):
             names = ", ".join(self.parameters_to_fix)
             advice = OVER_PARAMETERISED.format(names, self.parameters_to_fix[0])
             lines += ["", f"**{advice}**"]
-        lines += ["", *self._noise_table()]
+        if len(self.free) > 1:
+            lines += ["", *self._correlation_table()]
+        lines += ["", "## What this law means", ""]
+        has_closure = self.problem.closure is not None
+        lines += describe(self.law, self._tested_stresses(), specimen_size, has_closure)
+        lines += ["", "## Tests"]
         notes = [f"- {curve.name}: {note}" for curve in self.problem.curves for note in curve.notes]
         if notes:
             lines += ["", "Before the fit:", "", *notes]
         if self.problem.shears:
             lines += self._peak_table()
-        if any(self.shape_differs):
-            names = "; ".join(compress(self.series_names, self.shape_differs))
-            lines += ["", f"**{names} has another shape than the law.** {SHAPE_DIFFERS}"]
+        lines += ["", *self._noise_table()]
         return "\n".join(lines) + "\n"
+
+    def comparisons(
+        self,
+        predicted: Sequence[ShearCurve] = (),
+        held_out: tuple[Array, Array] | None = None,
+    ) -> list[Comparison]:
+        """The measured quantities of all tests beside the law and its band, see `Comparison`.
+
+        predicted, held_out: as in `plot`.
+        """
+        return compare(self, predicted, held_out)
+
+    def _tested_stresses(self) -> list[float]:
+        """The mean normal stresses of the shear tests, or the range of the closure test, in Pa."""
+        stresses = {float(f"{np.mean(curve.normal):.3g}") for curve in self.problem.shears}
+        closure = self.problem.closure
+        if closure is not None:
+            stresses |= {float(f"{x:.3g}") for x in (closure.stress.min(), closure.stress.max())}
+        return sorted(stresses)
+
+    def _correlation_table(self) -> list[str]:
+        """Correlation of the free parameters."""
+        rows = []
+        for name, row in zip(self.free, self.correlation, strict=True):
+            rows.append(" | ".join([name, *(f"{value:+.2f}" for value in row)]))
+        return table(f"correlation | {' | '.join(self.free)}", rows)
 
     def _parameter_table(self) -> list[str]:
         """Value and 95 % interval of each free parameter."""
@@ -175,14 +214,31 @@ class Fit(Estimates):
 
         Returns the figure.
         """
+        comparisons = self.comparisons(predicted, held_out)
         closure = self.problem.closure
         shears = [*self.problem.shears, *predicted]
         panels = (closure is not None) + 2 * bool(shears)
-        figure, axes = pyplot().subplots(1, panels, figsize=(4.6 * panels + 1, 4.4), squeeze=False)
+        figure, axes = pyplot().subplots(
+            2,
+            panels,
+            figsize=(4.6 * panels + 1, 5.6),
+            squeeze=False,
+            sharex="col",
+            height_ratios=(3, 1),
+        )
         if closure is not None:
             self._plot_closure(axes[0, 0], closure, held_out)
+            parts = [one for one in comparisons if one.quantity == "normal stress"]
+            _plot_residuals(axes[1, 0], parts, 1e6, ["C0"] * len(parts))
+            axes[1, 0].set_xlabel("closure since the start of the test (µm)")
         if shears:
             self._plot_shear(axes[0, -2:], shears)
+            names = [curve.name for curve in shears]
+            for axis, quantity in zip(axes[1, -2:], ("shear stress", "opening"), strict=True):
+                parts = [one for one in comparisons if one.quantity == quantity]
+                colors = [f"C{names.index(one.test) % 10}" for one in parts]
+                _plot_residuals(axis, parts, 1e3, colors)
+                axis.set_xlabel("shear displacement (mm)")
             entries = axes[0, -2].get_legend_handles_labels()
             figure.legend(*entries, loc="outside lower center", ncols=panels)
         return written(figure, path)
@@ -190,7 +246,7 @@ class Fit(Estimates):
     def _plot_shear(self, axes: Any, shears: Sequence[ShearCurve]) -> None:
         """Plot shear stress and opening of tests, the law and its bands on two axes."""
         for k, (curve, test) in enumerate(zip(shears, self.predict_shear(*shears), strict=True)):
-            color = f"C{k}"
+            color = f"C{k % 10}"
             is_fitted = k < len(self.problem.shears)
             markers = {
                 "color": color,
@@ -209,8 +265,8 @@ class Fit(Estimates):
                     axis.plot(1e3 * curve.shear, scale * measured, **markers)
             label = escape_math(curve.name) + ("" if is_fitted else ", predicted")
             axes[0].plot([], [], label=label, **markers)
-        axes[0].set(xlabel="shear displacement (mm)", ylabel="shear stress (MPa)")
-        axes[1].set(xlabel="shear displacement (mm)", ylabel="opening (mm)")
+        axes[0].set_ylabel("shear stress (MPa)")
+        axes[1].set_ylabel("opening (mm)")
 
     def _plot_closure(
         self, axis: Any, curve: ClosureCurve, held_out: tuple[Array, Array] | None
@@ -231,8 +287,28 @@ class Fit(Estimates):
         law = np.exp(log_stress(values, values["preload_closure"] + u, self.problem.settings))
         axis.plot(1e6 * u, law / 1e6, color="C1", label="law")
         axis.plot(1e6 * curve.closure, curve.stress / 1e6, "oC0", ms=4, label="measured")
-        axis.set(xlabel="closure since the start of the test (µm)", ylabel="normal stress (MPa)")
+        axis.set_ylabel("normal stress (MPa)")
         axis.legend()
+
+
+def _plot_residuals(
+    axis: Any, comparisons: Sequence[Comparison], scale: float, colors: Sequence[str]
+) -> None:
+    """Plot the residuals of one quantity, law minus measured, as a percentage.
+
+    scale: units of the axis of displacements per m.
+    """
+    axis.set_ylabel("residual (%)")
+    if not comparisons:
+        axis.set_yticks([])
+        axis.text(0.5, 0.5, "not measured", transform=axis.transAxes, ha="center", va="center")
+        return
+    axis.axhline(0.0, color="0.5", lw=0.8)
+    for one, color in zip(comparisons, colors, strict=True):
+        fill = None if one.is_fitted else "w"
+        axis.plot(scale * one.displacement, 100 * one.residual, "o", color=color, mfc=fill, ms=3)
+    largest = max(float(np.nanmax(np.abs(one.residual))) for one in comparisons)
+    axis.set_ylim(-120 * largest, 120 * largest)
 
 
 def fit_curves(

@@ -178,7 +178,9 @@ def write_results(
 
 def settings(options: argparse.Namespace) -> dict[str, Any]:
     """The options of a command for its summary, without the options that direct the output."""
-    return {k: v for k, v in vars(options).items() if k not in ("run", "out", "force", "json")}
+    return {
+        k: v for k, v in vars(options).items() if k not in ("run", "out", "force", "json", "words")
+    }
 
 
 def print_json(data: Any) -> None:

@@ -1,7 +1,10 @@
 """`jointlaw fit`: one law for measured closure and shear tests, with report and picture."""
 
 import argparse
+import hashlib
+import math
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from functools import partial
 from itertools import compress
 from pathlib import Path
@@ -12,6 +15,7 @@ import numpy as np
 from .. import presets
 from ..calibration import datasets
 from ..calibration.aperture import FlowConditions, FlowFit, fit_flow, read_flow
+from ..calibration.comparison import count_within, to_csv
 from ..calibration.envelopes import (
     ENVELOPES,
     envelope_strength,
@@ -19,11 +23,13 @@ from ..calibration.envelopes import (
     peak_and_last,
 )
 from ..calibration.fit import Fit, fit_curves
+from ..calibration.meaning import spacing
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array
 from ..support.markdown import table
 from ..support.text_numbers import DECIMAL_MARKS
+from ..support.version import __version__
 from .command import (
     JSON,
     OUT,
@@ -89,10 +95,12 @@ def _run(options: argparse.Namespace) -> None:
     closure_curves, held_out = _read_closure(options)
     fitted, predicted = _split_shear_tests(_read_shear_tests(options), options.fit)
     fit = fit_curves([*closure_curves, *fitted], **parameters)
+    comparisons = fit.comparisons(predicted, held_out)
+    provenance = _provenance(options, [*closure_curves, *fitted, *predicted])
     shear_files = [*options.shear, *([options.peaks] if options.peaks else [])]
     name = ", ".join(Path(file).name for file in [*options.data, *shear_files])
     require_rock(fit.parameters, f"{name}: the fitted ")
-    text = fit.report()
+    text = fit.report(_specimen_size(options))
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
@@ -101,6 +109,10 @@ def _run(options: argparse.Namespace) -> None:
         "not_identifiable": fit.not_identifiable,
         "shape_differs": dict(zip(fit.series_names, fit.shape_differs, strict=True)),
         "noise": fit.solution.noise.mean._asdict(),
+        "correlation": fit.correlation.tolist(),
+        "spacing_of_asperities_m": spacing(fit.law),
+        "points_in_band": count_within([one for one in comparisons if one.is_fitted]),
+        "provenance": provenance,
     }
     if held_out is not None:
         error = fit.predict(held_out.closure) / held_out.stress - 1
@@ -109,6 +121,7 @@ def _run(options: argparse.Namespace) -> None:
     if predicted:
         text += _report_predictions(fit, fitted, predicted)
     files: Contents = {
+        "points.csv": to_csv(comparisons),
         "fit.png": partial(fit.plot, held_out=held_out, predicted=predicted),
         "law.toml": fit.law.to_toml,
     }
@@ -118,8 +131,47 @@ def _run(options: argparse.Namespace) -> None:
         summary |= flow_fit.summary()
         law_text = f"{fit.law.to_toml()}\n{flow_fit.aperture.to_toml()}"
         files = {**files, "law.toml": law_text, "flow.png": flow_fit.plot}
+    text += _report_provenance(provenance)
     files = {**files, "report.md": text}
     write_results(options, files, summary, text)
+
+
+def _specimen_size(options: argparse.Namespace) -> float | None:
+    """Edge of the specimen in m, if its side or area is known."""
+    area = options.area or options.closure_area
+    return options.side or (math.sqrt(area) if area else None)
+
+
+def _provenance(
+    options: argparse.Namespace, curves: Sequence[ClosureCurve | ShearCurve]
+) -> dict[str, Any]:
+    """Version, command, date, hashes of the files, and the columns that were read."""
+    paths = [*options.data, *options.shear, options.peaks, options.flow]
+    files = [Path(path) for path in paths if path and Path(path).is_file()]
+    return {
+        "version": __version__,
+        "command": options.words,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "sha256": {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files},
+        "columns": {curve.name: curve.source for curve in curves if curve.source},
+    }
+
+
+def _report_provenance(provenance: dict[str, Any]) -> str:
+    """Where a fit comes from (Markdown)."""
+    lines = [
+        "",
+        "## Provenance",
+        "",
+        f"jointlaw {provenance['version']}, {provenance['date']}:",
+        "",
+        f"    {provenance['command']}",
+        "",
+        *table("file | SHA-256", [f"{a} | `{b}`" for a, b in provenance["sha256"].items()]),
+        "",
+        *table("test | columns", [f"{a} | {b}" for a, b in provenance["columns"].items()]),
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def _require_consistent(options: argparse.Namespace) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import shlex
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
@@ -55,6 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = " ".join(["jointlaw", *words[:1]])
     try:
         options = _parse(words)
+        options.words = shlex.join(["jointlaw", *words])
         if getattr(options, "out", None) and not options.force:
             require_free(options.out)
         return int(options.run(options) or 0)

@@ -97,7 +97,7 @@ def test_closure_file(tmp_path):
     text = "Disp;sigmaZ\n/mm;/kPa\n" + rows(U, 1e3 * U, mark=";")
     stress, closure, notes, source = read(tmp_path, text, read_closure)
     assert not notes
-    assert source == "sigmaZ is load, Disp is closure"
+    assert source == "normal stress: sigmaZ [kPa]; closure: Disp [mm]"
     np.testing.assert_allclose(closure, 1e-3 * U)
     np.testing.assert_allclose(stress, 1e6 * U)
     assert all(load(name)[0].max() > 1e6 for name in names())

@@ -185,7 +185,11 @@ DEM_LINES = {
 }
 # Files of which only the names are compared
 BINARIES = (".zip", ".png", ".svg", ".pdf", ".gif", ".npz", ".npy", ".so", ".vtu")
-TIMES = r'"wall_time_s": [^,}]*|estimated .*'  # of a run; they differ from run to run
+# of a run, which differ from run to run, and the command line that a report repeats
+TIMES = (
+    r'"wall_time_s": [^,}]*|estimated .*|"date": .*|"command": .*|jointlaw [\d.]+, 20.*'
+    r"|    jointlaw .*"
+)
 REFUSALS = ("called with", "the fitted a = ")  # of work that is replaced; of heights in nm
 FROM_FIELD = cache(jointlaw.cli.field.from_field)
 PRESENT = {}  # outcomes of lines without an option
@@ -266,6 +270,8 @@ def flat(value):
 # A fit without results, for commands that go on with a flow test
 NO_FIT = Mock(parameters={}, free=[], identifiable=[], series_names=[], shape_differs=[])
 NO_FIT.report.return_value = ""
+NO_FIT.comparisons.return_value = []
+NO_FIT.law.asperity_density = 1.0
 
 
 def report(*arguments, **keywords):

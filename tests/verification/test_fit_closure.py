@@ -44,8 +44,10 @@ def test_upper_half_of_the_measured_curve_is_predicted_within_two_percent(grimse
     assert (low <= held_out).all()
     assert (held_out <= high).all()
     assert (high[-1] - low[-1]) / held_out[-1] < 0.25  # and the band is narrow enough to be useful
-    (axes,) = fit.plot(held_out=(held_out, u)).axes
+    axes, residuals = fit.plot(held_out=(held_out, u)).axes
     points = {line.get_label(): line.get_xydata() for line in axes.lines}
+    errors = np.log(fit.predict(u) / held_out)
+    np.testing.assert_allclose(residuals.lines[-1].get_ydata(), 100 * errors)
     assert points["measured, not fitted"] == pytest.approx(
         np.column_stack([1e6 * u, held_out / 1e6])
     )
@@ -86,7 +88,10 @@ def test_heights_are_not_identifiable_from_one_closure_curve(grimsel):
     fit = jl.fit_curves([jl.ClosureCurve(*grimsel)])
     assert {"alpha", "beta"} <= set(fit.not_identifiable)
     assert set(fit.identifiable) == set(fit.free) - set(fit.not_identifiable)
-    assert all(axis.get_xlabel() and axis.get_ylabel() for axis in fit.plot().axes)
+    curve, residuals = fit.plot().axes
+    assert residuals.get_xlabel()
+    assert curve.get_ylabel()
+    assert residuals.get_ylabel()
 
 
 def test_closure_along_a_hyperbola_has_another_shape(law):

@@ -5,6 +5,8 @@ Peak and residual stress of sandstone joints, profile JA, dry: Mendeley Data, do
 10.17632/g5pf6k9n2w, as parsed by ybfo/RockJointNet.
 """
 
+import csv
+import hashlib
 import json
 import re
 from dataclasses import replace
@@ -14,6 +16,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw import ClosureCurve, ShearCurve
+from jointlaw.calibration.meaning import describe, respond
 from jointlaw.calibration.shearing import simulate_shear
 from jointlaw.cli.main import main
 
@@ -285,8 +288,74 @@ def test_cohesion_from_shear_and_tension_from_opening(law):
     assert fit.shape_differs == (True,)
 
 
+def require_complete_report(printed, folder, line, law):
+    """Check quality, meaning and provenance of a report, and the table of points, by the files."""
+    points = [*csv.DictReader((folder / "o" / "points.csv").read_text().splitlines())]
+    texts = ("test", "use", "quantity", "unit")
+    types = [(name, "U60" if name in texts else float) for name in points[0]]
+    table = np.array([tuple(x or "nan" for x in point.values()) for point in points], types)
+    is_stress = table["quantity"] == "shear stress"
+    measured = np.loadtxt(
+        [row.replace(",", ".") for row in (folder / "s3.csv").read_text().splitlines()[2:]],
+        delimiter=";",
+    )
+    rows = table[is_stress & (table["test"] == "s3.csv, 3 MPa")]
+    np.testing.assert_allclose(rows["displacement_mm"], measured[:, 0], atol=1e-4)
+    np.testing.assert_allclose(rows["measured"], 1e-3 * measured[:, 1], atol=1e-5)
+    largest = rows["measured"].max()
+    percent = 100 * (rows["law"] - rows["measured"]) / largest
+    is_other = np.arange(rows.size) != np.argmax(rows["measured"])  # a peak is compared anywhere
+    is_other[0] = False
+    np.testing.assert_allclose(rows["residual_percent"][is_other], percent[is_other], atol=0.01)
+    assert np.all((rows["low"] <= rows["law"]) & (rows["law"] <= rows["high"]))
+    residuals = table["residual_percent"][is_stress]
+    rms = np.sqrt(np.nanmean(residuals**2))
+    assert f"{rms:.2g} % of the largest shear stress (the peaks " in printed
+    n_residuals = np.sum(np.isfinite(table["residual_percent"]))
+    within = int(re.search(rf"(\d+) of {n_residuals} points are within the 95 % band", printed)[1])
+    assert 0.9 * n_residuals <= within <= n_residuals
+    summary = json.loads((folder / "o" / "summary.json").read_text())
+    assert summary["points_in_band"] == [within, n_residuals]
+    provenance = summary["provenance"]
+    assert provenance["command"] == f"jointlaw {line}"
+    digest = hashlib.sha256((folder / "s1.csv").read_bytes()).hexdigest()
+    assert provenance["sha256"]["s1.csv"] == digest
+    assert digest in printed
+    expected = "shear displacement: us [mm]; shear stress: tau [kPa]; normal stress: sn [MPa]; "
+    assert provenance["columns"]["s1.csv, 1 MPa"] == expected + "opening: un [mm]"
+    correlation = np.array(summary["correlation"])
+    np.testing.assert_allclose(np.diag(correlation), 1.0)
+    np.testing.assert_allclose(correlation, correlation.T)
+    fitted = jl.JointLaw.from_toml(folder / "o" / "law.toml")
+    assert summary["spacing_of_asperities_m"] == pytest.approx(fitted.asperity_density**-0.5)
+    cells = next(one for one in printed.splitlines() if one.startswith("| 5 |")).split("|")
+    closure = fitted.closure(5e6)
+    stiffness = (
+        np.subtract(*fitted.normal_stress(closure * np.array([1.01, 0.99]))) / closure / 0.02
+    )
+    figures = [5, 1e3 * closure, stiffness / 1e9, fitted.secant_stiffness(5e6)[1] / 1e9]
+    figures.append(100 * fitted.contact_fraction(closure))
+    assert [float(cell) for cell in cells[1:-1]] == pytest.approx(figures, rel=0.01)
+    # within the scatter of three tests
+    assert figures[2] == pytest.approx(respond(law, 5e6).normal_stiffness / 1e9, rel=0.1)
+
+
 U = np.concatenate([np.linspace(0, 0.5e-3, 9), np.linspace(0.75e-3, 3e-3, 10)])  # m
 NOISE = 0.005  # of the largest shear stress
+
+
+def test_meaning_of_a_law_warns_of_asperities_of_the_size_of_a_specimen(law):
+    """With 400 asperities on the specimen it does not, with a quarter of them it does."""
+    few = replace(law, asperity_density=1e4)
+    assert "**" not in " ".join(describe(few, [1e6], specimen_size=0.2))
+    warned = " ".join(describe(few, [1e6, 5e6], specimen_size=0.1))
+    assert "10 % of the specimen:** it would have about 100," in warned
+    assert "No closure was measured" in warned
+    assert "product of asperity_density and K" in " ".join(describe(few, [1e6], has_closure=True))
+    assert "if it has 100 mm" in " ".join(describe(few, [1e6]))
+    # at the closure of a stress that yielding asperities never reach there is no figure
+    soft = replace(law.asperity, yield_interference=1e-9)
+    assert "| 5e+03 | " in " ".join(describe(replace(few, asperity=soft), [5e9]))
 
 
 @pytest.mark.slow
@@ -310,7 +379,9 @@ def test_three_shear_files_and_a_closure_file_predict_a_fourth(tmp_path, law, ca
     (tmp_path / "c.csv").write_text("\n".join(["sigma_n [MPa],closure [um]", *rows]))
     line = "fit c.csv --shear s1.csv s3.csv s5.csv --set alpha=3 --set beta=2e-5 --out o"
     assert main(line.split()) == 0
-    assert "another shape than the law" not in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "another shape than the law" not in printed
+    require_complete_report(printed, tmp_path, line, law)
     assert (tmp_path / "o" / "fit.png").read_bytes().startswith(b"\x89PNG")
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     assert {"mu", "a", "mating_length", "asperity_density"} <= set(summary["identifiable"])

@@ -15,9 +15,9 @@ from command_line import output_folder
 from PIL import Image
 
 import jointlaw as jl
-from jointlaw.kernels.asperities import effective_closure, friction_limit, is_at_limit
+from jointlaw.kernels.asperities import friction_limit, is_at_limit
 from jointlaw.kernels.cells import evaluate_cells
-from jointlaw.kernels.interlock import planes
+from jointlaw.kernels.interlock import effective_closure, planes
 from jointlaw.kernels.reference import state_parts
 from jointlaw.support.pyplot import style
 

@@ -139,7 +139,7 @@ class Fit(Estimates):
         """Names and values of the fixed parameters that act."""
         values = self.parameters
         excluded = {*self.free}
-        if np.isinf(values["slope_wear"]):
+        if np.isinf(values["slope_wear"]) and np.isinf(values["degradation_stress"]):
             excluded.add("slope_residual")
         fixed = [name for name in values if name not in excluded and np.isfinite(values[name])]
         return ", ".join(f"{name} = {values[name]:.4g}" for name in fixed)

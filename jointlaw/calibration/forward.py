@@ -9,7 +9,11 @@ from scipy import special
 
 from ..discretisation.facets import facets
 from ..discretisation.first_loading_curve import exact_force
-from ..discretisation.first_loading_response import correct_for_yielding, sum_facets
+from ..discretisation.first_loading_response import (
+    DegradingFacets,
+    correct_for_yielding,
+    sum_facets,
+)
 from ..laws.joint_law import MIN_MATING_LENGTH, JointLaw
 from ..parameters.bond import MODES, Bond
 from ..parameters.declared import parameters_of
@@ -90,6 +94,7 @@ def build_law(values: Values, settings: Settings, plane: float | None = None) ->
         mating_length=math.inf,
         slope_wear=math.inf,
         slope_residual=0.0,
+        degradation_stress=math.inf,
     )
     if math.isinf(values["mating_length"]):
         return interlocked
@@ -99,6 +104,7 @@ def build_law(values: Values, settings: Settings, plane: float | None = None) ->
         **options,
         slope_wear=values["slope_wear"],
         slope_residual=values["slope_residual"],
+        degradation_stress=values["degradation_stress"],
         mating_length=max(values["mating_length"], min_mating_length),
     )
 
@@ -139,16 +145,53 @@ def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
     nodes = facets(orientation, resolution.u, resolution.phi, closure_only=True)
     scale = nodes.scale(p, values["asperity_density"])
     force = _first_loading_force(closure, p.eta, heights)
-    stress = sum_facets(nodes.theta, scale, p.lam, p.mu) * force
-    yielding = correct_for_yielding(nodes.theta, scale, p)
-    if yielding is not None:
-        weight, yield_closure = yielding
-        max_closure = np.maximum.accumulate(closure)[:, None]
-        plastic_force = _first_loading_force(max_closure - yield_closure, p.eta, heights)
-        stress = stress - np.minimum(plastic_force, force[:, None]) @ weight
+    if math.isfinite(values["degradation_stress"]) and math.isfinite(values["mating_length"]):
+        degrading = DegradingFacets(
+            nodes.theta,
+            scale,
+            p.yield_interference / np.cos(nodes.theta),
+            p.lam,
+            p.mu,
+            values["degradation_stress"],
+            values["slope_residual"],
+        )
+        stress = _degraded_stress(degrading, closure, force, p.eta, heights)
+    else:
+        stress = sum_facets(nodes.theta, scale, p.lam, p.mu) * force
+        yielding = correct_for_yielding(nodes.theta, scale, p)
+        if yielding is not None:
+            weight, yield_closure = yielding
+            max_closure = np.maximum.accumulate(closure)[:, None]
+            plastic_force = _first_loading_force(max_closure - yield_closure, p.eta, heights)
+            stress = stress - np.minimum(plastic_force, force[:, None]) @ weight
     for element in law.tables.elements[1:]:  # elements other than the asperities
         stress = stress + element.normal_stress(np.maximum(closure, 0.0))
     return np.log(np.maximum(stress, 1e-300))
+
+
+def _degraded_stress(
+    degrading: DegradingFacets,
+    closure: Array,
+    force: Array,
+    eta: float,
+    heights: HeightDistribution | None,
+) -> Array:
+    """Normal stress (n,) in Pa at closures (n,) in m of facets that degrade by stress.
+
+    force: first-loading curve (n,) at the closures. In unloading the ratio of the normal stress to
+    the contact stress stays.
+    """
+    max_closure = np.maximum.accumulate(closure)
+    max_force = np.maximum.accumulate(force)
+    indented = np.zeros((len(closure), len(degrading.theta)))
+    if np.isfinite(degrading.yield_depth).all():
+        depth = max_closure[:, None] - degrading.yield_depth
+        indented = _first_loading_force(depth, eta, heights)
+    weight = degrading.scale * np.cos(degrading.theta)
+    remaining = np.maximum(force[:, None] - indented, 0.0) @ weight
+    largest = (max_force[:, None] - indented) @ weight
+    share = np.divide(remaining, largest, out=np.ones_like(largest), where=largest > 0)
+    return share * degrading.stress(max_force, indented)
 
 
 def _first_loading_force(closure: Array, eta: float, heights: HeightDistribution | None) -> Array:

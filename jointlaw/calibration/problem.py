@@ -286,10 +286,15 @@ def _finite_initial_value(
 ) -> float:
     """Initial value of a parameter with an infinite default: half the range of the tests.
 
+    For a degradation stress this is the largest normal stress.
+
     For a yield interference without a closure test this is half the closure of the law at the
     largest normal stress: beyond the closure no asperity would yield, and the misfit would not
     depend on it.
     """
+    if name == "degradation_stress":
+        stresses = [curve.stress for curve in closures] + [curve.normal for curve in shears]
+        return max(float(np.max(stress)) for stress in stresses)
     if not shears or (closures and name == "yield_interference"):
         return 0.5 * max(float(np.ptp(curve.closure)) for curve in closures)
     if name == "yield_interference":

@@ -14,6 +14,8 @@ from .first_loading_curve import FirstLoadingCurve
 _MAX_YIELD_INTERFERENCES = 1e8  # then Phi less its value one interference earlier has 8 digits
 _MIN_FLOAT = sys.float_info.min
 _BISECTIONS = 63  # of all floats in log closure: to rounding
+_MAX_FORCE = 1e150  # Phi whose stress counts as infinite
+QUADRATURE_NODES = 8  # of the mean of the sines of degrading facets, as in native/host.h
 
 
 class FirstLoadingResponse(NamedTuple):
@@ -26,6 +28,7 @@ class FirstLoadingResponse(NamedTuple):
     curve: FirstLoadingCurve
     factor: float  # `sum_facets`
     plastic_correction: tuple[Array, Array] | None = None  # `correct_for_yielding`
+    degradation: "DegradingFacets | None" = None  # of facets that degrade by stress
 
     @classmethod
     def of(cls, curve: FirstLoadingCurve, theta: Array, scale: Array, asperity: Asperity) -> Self:
@@ -36,6 +39,11 @@ class FirstLoadingResponse(NamedTuple):
     def stress(self, closure: Array) -> Array:
         """Normal stress (Pa) at closures (m), infinite where it overflows."""
         stress: Array = self.factor * self.curve.force(closure)[0]
+        if self.degradation is not None:
+            facets = self.degradation
+            depth = np.maximum(closure[..., None] - facets.yield_depth, 0.0)
+            indented = self.curve.force(depth)[0]
+            return facets.stress(self.curve.force(closure)[0], indented)
         if self.plastic_correction is not None:
             factors, depths = self.plastic_correction
             stress = stress - self.curve.force(closure[..., None] - depths)[0] @ factors
@@ -47,6 +55,62 @@ class FirstLoadingResponse(NamedTuple):
         if self.plastic_correction is None:
             return 1e304
         return _MAX_YIELD_INTERFERENCES * float(np.max(self.plastic_correction[1]))
+
+
+class DegradingFacets(NamedTuple):
+    """M facets whose slopes decrease with the contact stress, in first closure without shear.
+
+    Normal forces do not depend on the slopes, as the joint has not climbed: the contact stress is
+    N = sum of A c1 (Phi - Phi at the plastic indentation). The shear force of facets that stick
+    comes from all slopes that the facet had on the way; `stress` takes their mean over N, which is
+    exact for elastic asperities. A joint with finite steps and cells differs by its accuracy.
+    """
+
+    theta: Array  # inclinations (M,)
+    scale: Array  # A (M,)
+    yield_depth: Array  # yield interference along y (M,), infinite for elastic asperities
+    lam: float
+    mu: float
+    degradation_stress: float
+    slope_residual: float
+
+    def retention(self, relative_stress: Array) -> Array:
+        """Slope retention at a contact stress over the degradation stress."""
+        return self.slope_residual + (1 - self.slope_residual) / (1 + relative_stress)
+
+    def sines(self, relative_stress: Array) -> Array:
+        """Sines of the inclinations (..., M) at contact stresses (...) as in `retention`."""
+        slope = np.tan(self.theta) * self.retention(relative_stress)[..., None]
+        sines: Array = slope / np.sqrt(1 + slope**2)
+        return sines
+
+    def mean_sines(self, relative_stress: Array) -> Array:
+        """Means of the sines over the contact stress from zero to this one."""
+        x, weights = np.polynomial.legendre.leggauss(QUADRATURE_NODES)
+        top = np.log1p(relative_stress)
+        total: Array = np.zeros((*relative_stress.shape, len(self.theta)))
+        for node, weight in zip(0.5 * (1 + x), 0.5 * weights, strict=True):
+            share = np.exp(node * top) * (weight * top / np.where(top > 0, relative_stress, 1.0))
+            total = total + self.sines(np.expm1(node * top)) * share[..., None]
+        return np.where(top[..., None] > 0, total, self.sines(relative_stress))
+
+    def stress(self, force: Array, indented: Array) -> Array:
+        """Normal stress (...) in Pa.
+
+        force: Phi (...) at the closure; indented: Phi at the plastic indentation (..., M), zero for
+        elastic asperities.
+        """
+        c1 = np.cos(self.theta)
+        overflows = force > _MAX_FORCE
+        force = np.where(overflows, 0.0, force)
+        elastic = np.maximum(force[..., None] - indented, 0.0)
+        contact_stress = elastic @ (self.scale * c1)
+        relative_stress = contact_stress / self.degradation_stress
+        sines = self.sines(relative_stress)
+        stick = self.mean_sines(relative_stress) * (force[..., None] / (c1 * self.lam))
+        slip = self.mu * c1 * elastic / np.sqrt(1 - sines**2)
+        friction: Array = (sines * np.minimum(stick, slip)) @ self.scale
+        return np.where(overflows, np.inf, contact_stress + friction)
 
 
 def find_closure(

@@ -42,6 +42,7 @@ class FacetTables(Facets):
     yield_depth: Array
     slope_wear: float
     slope_residual: float
+    degradation_stress: float
 
     def __post_init__(self) -> None:
         read_only(tuple(vars(self).values()))
@@ -72,6 +73,16 @@ class FacetTables(Facets):
         return self.slope_wear < math.inf
 
     @property
+    def degrades_by_stress(self) -> bool:
+        """Whether asperities degrade by the contact stress."""
+        return self.degradation_stress < math.inf
+
+    @property
+    def slopes_change(self) -> bool:
+        """Whether asperities degrade, by work or by stress: then a state holds the lost slopes."""
+        return self.degrades or self.degrades_by_stress
+
+    @property
     def dim(self) -> int:
         """Components of a displacement: 3, 2 in one plane, 1 for closure alone."""
         return len(self.m)
@@ -97,6 +108,7 @@ def facet_tables(
     mating_length: float,
     slope_wear: float,
     slope_residual: float,
+    degradation_stress: float,
     lowest: float,
 ) -> FacetTables:
     """Tables of these facets, with the parameters of a law.
@@ -130,6 +142,7 @@ def facet_tables(
         yield_depth=asperity.yield_interference / c1,
         slope_wear=slope_wear,
         slope_residual=slope_residual,
+        degradation_stress=degradation_stress,
     )
 
 

@@ -18,9 +18,9 @@ of the step; where it decreases, springs disengage and release their part of the
 asymmetry makes every term of the dissipated energy non-negative, whatever the step.
 
 Options add rows to the state. If asperities yield: the plastic indentation (M) of every facet and
-the plastic work (1), see plasticity.py. If asperities degrade: the lost fraction of the slopes (1)
-and the shear work (1) that degrades them, see degradation.py. If the interlock decays, planes of
-facets rotate with slip, see interlock.py.
+the plastic work (1), see plasticity.py. If asperities degrade: the lost fraction of the slopes (1),
+and what degrades them: the shear work (1), the largest contact stress (1), see degradation.py. If
+the interlock decays, planes of facets rotate with slip, see interlock.py.
 """
 
 from functools import cached_property
@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretisation.first_loading_response import FirstLoadingResponse
+from ..discretisation.first_loading_response import DegradingFacets, FirstLoadingResponse
 from ..discretisation.tables import FacetTables, max_effective_closure
 from ..support.checks import Array
 from ..support.thresholds import (
@@ -37,13 +37,33 @@ from ..support.thresholds import (
     MIN_CHORD_STEP,
     MIN_DIVISOR,
     ROUNDING_TOLERANCE,
-    UNDERFLOW,
 )
 from .cells import Cells, evaluate_cells, reciprocal, slider_compliance
-from .degradation import degrade_sliders, degrade_slopes
+from .degradation import (
+    AsperityState,
+    climb,
+    degrade_by_stress,
+    degrade_sliders,
+    degrade_slopes,
+    slope_energy_rate,
+)
 from .element import Element, ElementResponse, Measures
-from .interlock import PlaneDerivatives, Planes, first_touch, offset, plane_derivatives, planes
-from .plasticity import plastic_softening, plastic_work, subtract_plastic, update_indentation
+from .interlock import (
+    PlaneDerivatives,
+    Planes,
+    effective_closure,
+    first_touch,
+    plane_derivatives,
+    planes,
+    retention_derivatives,
+)
+from .plasticity import (
+    normal_softening,
+    plastic_softening,
+    plastic_work,
+    subtract_plastic,
+    update_indentation,
+)
 from .stiffness import (
     curvature_stiffness,
     engagement_stiffness,
@@ -53,21 +73,6 @@ from .stiffness import (
 
 Flags = NDArray[np.bool_]
 MAX_SLIP = 1e150  # mating lengths: squares of larger slips overflow
-
-
-class AsperityState(NamedTuple):
-    """The parts of the rows (rows, B) of asperities in a state, as views."""
-
-    q: Array  # slider forces times lam (2, M, D, B)
-    indentation: Array  # plastic indentation of every facet (M, B); no rows unless they yield
-    plastic_work: Array  # (B,) in J/m2, or no rows
-    lost_slopes: Array  # lost fraction of the slopes (B,); no rows unless they degrade
-    shear_work: Array  # (B,) in J/m2 that degrades slopes, or no rows
-
-    @property
-    def slope_retention(self) -> Array:
-        """Remaining fraction of the slopes (B,)."""
-        return 1 - self.lost_slopes if self.lost_slopes.size else np.ones(self.q.shape[-1])
 
 
 class Sliders(NamedTuple):
@@ -106,8 +111,12 @@ class AsperityElement(Element):
         self.rows = {"q": 2 * M * k.cells}
         if k.yields:
             self.rows |= {"indentation": M, "plastic_work": 1}
+        if k.slopes_change:
+            self.rows |= {"lost_slopes": 1}
         if k.degrades:
-            self.rows |= {"lost_slopes": 1, "shear_work": 1}
+            self.rows |= {"shear_work": 1}
+        if k.degrades_by_stress:
+            self.rows |= {"peak_contact_stress": 1}
         self.closure_per_displacement = 1.0 + 2.0 * float(np.max(np.abs(k.m)))
         finite = max_effective_closure(k.curve, k.area, k.theta, k.asperity)
         self.max_effective_closure = min(finite, MAX_SLIP * k.mating_length)
@@ -126,11 +135,13 @@ class AsperityElement(Element):
             "yields": int(k.yields),
             "interlock_decays": int(k.interlock_decays),
             "degrades": int(k.degrades),
+            "degrades_by_stress": int(k.degrades_by_stress),
             "stiffness_ratio": 1.0 / k.lam,
             "mu": k.mu,
             "mating_length": k.mating_length,
             "slope_wear": k.slope_wear,
             "slope_residual": k.slope_residual,
+            "degradation_stress": k.degradation_stress,
             "first_touch_closure": float(first_touch(k)[0]) if can_be_unmated else 0.0,
             "eta": k.curve.eta,
             "curve_scale": k.curve.scale,
@@ -171,16 +182,23 @@ class AsperityElement(Element):
         retention = old.slope_retention
         dissipated = np.zeros(d.shape[1])
         if k.degrades:
-            updated.lost_slopes[:] = degrade_slopes(k, old.lost_slopes, old.shear_work)
+            updated.lost_slopes[:] = degrade_slopes(k, old)
             retention = updated.slope_retention
             q, dissipated = degrade(k, delta, old, retention)
         after_delta = delta + d
+        end_retention = retention
+        if k.degrades_by_stress:
+            updated.lost_slopes[:], updated.peak_contact_stress[:], retention_slope = (
+                degrade_by_stress(k, after_delta, old, updated.lost_slopes)
+            )
+            end_retention = updated.slope_retention
+        middle_retention = 0.5 * (retention + end_retention)
         middle_p = delta[1:] + 0.5 * d[1:]
-        middle = planes(k, middle_p, retention)
-        end = planes(k, after_delta[1:], retention)
+        middle = planes(k, middle_p, middle_retention)
+        end = planes(k, after_delta[1:], end_retention)
 
         before = evaluate_cells(k, effective_closure(k, delta, retention))
-        after = evaluate_cells(k, effective_closure(k, after_delta, retention))
+        after = evaluate_cells(k, effective_closure(k, after_delta, end_retention))
         increase = after.G - before.G
         indented0 = None
         indented1 = None
@@ -206,21 +224,43 @@ class AsperityElement(Element):
         if k.degrades:
             F0 = sum_traction(k, planes(k, delta[1:], retention), before.force, q)
             updated.shear_work[:] = old.shear_work + np.minimum(friction, shear_work(F0, F, d))
+        if k.degrades_by_stress:
+            ends = ((delta, before), (after_delta, after))
+            rates = [np.sum(slope_energy_rate(k, delta_, cells), axis=0) for delta_, cells in ends]
+            # >= 0, but for rounding, because opposite facets have the same weight
+            normal_loss = np.maximum(0.5 * sum(rates) * (retention - end_retention), 0.0)
+            dissipated = dissipated + normal_loss
         if k.yields:
             dissipated = dissipated + work
         if not tangent:
             return ElementResponse(F, dissipated, None)
         E = middle.basis
         if k.interlock_decays:  # the middle moves by half of the change of d
-            derivative = plane_derivatives(k, middle_p, retention).basis
+            derivative = plane_derivatives(k, middle_p, middle_retention).basis
             E = np.broadcast_to(E, (*E.shape[:3], d.shape[1])).copy()
             E[:, 1:] += 0.5 * np.einsum("edjmb,db->ejmb", derivative, d)
         C = tangent_of_fixed_planes(k, before, after, sliders, de, E, end)
         if indented0 is not None and indented1 is not None:
             C = C - plastic_softening(k, after, indented0, indented1, sliders.push, end)
         if k.interlock_decays:
-            rotation = plane_derivatives(k, after_delta[1:], retention)
+            rotation = plane_derivatives(k, after_delta[1:], end_retention)
             C[:, 1:] += tangent_of_rotation(k, after, sliders, updated.q, end, rotation)
+        if k.degrades_by_stress:
+            # the same three parts for a change of the retention instead of d
+            flattening = retention_derivatives(k, middle_p, middle_retention).basis
+            E = 0.5 * np.einsum("edjmb,db->ejmb", flattening, d)
+            climbing = end._replace(g=climb(k, after_delta)[None])
+            rotation = retention_derivatives(k, after_delta[1:], end_retention)
+            by_retention = tangent_of_fixed_planes(k, before, after, sliders, de, E, climbing)
+            by_retention += tangent_of_rotation(k, after, sliders, updated.q, end, rotation)
+            scale = (k.area * k.c1)[:, None]
+            by_d = np.einsum("mb,jmb->jb", scale * after.slope, end.g)
+            if indented0 is not None and indented1 is not None:
+                by_retention -= plastic_softening(
+                    k, after, indented0, indented1, sliders.push, climbing
+                )
+                by_d -= normal_softening(k, after, indented0, indented1, end)
+            C = C + by_retention * (retention_slope * by_d)
         return ElementResponse(F, dissipated, C)
 
     def traction(self, delta: Array, state: Array) -> Array:
@@ -312,7 +352,13 @@ class AsperityElement(Element):
     def first_loading(self) -> FirstLoadingResponse:
         """First closure without shear."""
         k = self.k
-        return FirstLoadingResponse.of(k.curve, k.theta, k.area, k.asperity)
+        response = FirstLoadingResponse.of(k.curve, k.theta, k.area, k.asperity)
+        if not k.degrades_by_stress:
+            return response
+        lam_mu = (k.lam, k.mu)
+        parameters = (k.degradation_stress, k.slope_residual)
+        facets = DegradingFacets(k.theta, k.area, k.yield_depth, *lam_mu, *parameters)
+        return response._replace(degradation=facets)
 
     def unpack(self, rows: Array) -> AsperityState:
         """Views of the parts of the rows (rows, B) of asperities, q as (2, M, D, B)."""
@@ -321,28 +367,18 @@ class AsperityElement(Element):
         q, options = np.split(rows, [2 * M * k.cells])
         none = options[:0]
         indentation, work = (options[:M], options[M]) if k.yields else (none, none)
-        lost_slopes, shear_work = options[-2:] if k.degrades else (none, none)
+        degradation = options[M + 1 :] if k.yields else options
+        lost_slopes = degradation[0] if k.slopes_change else none
+        shear_work = degradation[1] if k.degrades else none
+        peak = degradation[-1] if k.degrades_by_stress else none
         return AsperityState(
-            q.reshape(2, M, k.cells, -1), indentation, work, lost_slopes, shear_work
+            q.reshape(2, M, k.cells, -1), indentation, work, lost_slopes, shear_work, peak
         )
 
 
 def shear_work(F0: Array, F: Array, d: Array) -> Array:
     """Size (B,) in J/m2 of the work of the shear stress, from F0 to F, in the increment d."""
     return np.abs(0.5 * np.sum((F0[1:] + F[1:]) * d[1:], axis=0))
-
-
-def effective_closure(k: FacetTables, delta: Array, slope_retention: Array) -> Array:
-    """Effective closure y (M, B) in m of every facet: its normal approach over c1 = cos theta.
-
-    The sum m . (closure, offset), m = n/c1 being the facet normal scaled to a unit normal
-    component. `offset` computes the offset from the shear displacement `delta[1:]`; the retention
-    (B,) lowers the slopes of a law that degrades. Values below the underflow threshold become 0.
-    """
-    y = k.m[0][:, None] * delta[0]
-    for row, o in zip(k.m[1:], offset(k, delta[1:]), strict=True):
-        y = y + row[:, None] * (slope_retention * o if k.degrades else o)
-    return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
 
 
 def degrade(

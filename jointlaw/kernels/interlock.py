@@ -24,7 +24,7 @@ import numpy as np
 
 from ..discretisation.tables import FacetTables
 from ..support.checks import Array
-from ..support.thresholds import ROUNDING_TOLERANCE, UNMATED_DISTANCE
+from ..support.thresholds import ROUNDING_TOLERANCE, UNDERFLOW, UNMATED_DISTANCE
 
 
 class Planes(NamedTuple):
@@ -50,6 +50,19 @@ def offset(k: FacetTables, p: Array) -> Array:
         return p
     x = p / k.mating_length
     return p / np.sqrt(1 + np.sum(x * x, axis=0))
+
+
+def effective_closure(k: FacetTables, delta: Array, slope_retention: Array) -> Array:
+    """Effective closure y (M, B) in m of every facet: its normal approach over c1 = cos theta.
+
+    The sum m . (closure, offset), m = n/c1 being the facet normal scaled to a unit normal
+    component. `offset` computes the offset from the shear displacement `delta[1:]`; the retention
+    (B,) lowers the slopes of a law that degrades. Values below the underflow threshold become 0.
+    """
+    y = k.m[0][:, None] * delta[0]
+    for row, o in zip(k.m[1:], offset(k, delta[1:]), strict=True):
+        y = y + row[:, None] * (slope_retention * o if k.slopes_change else o)
+    return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
 
 
 def first_touch(k: FacetTables) -> Array:
@@ -95,7 +108,6 @@ def planes(k: FacetTables, p: Array, slope_retention: Array) -> Planes:
 
 def plane_derivatives(k: FacetTables, p: Array, slope_retention: Array) -> PlaneDerivatives:
     """Derivatives of the planes by the in-plane displacement p (dim - 1, B)."""
-    along, across, m, N = _slopes(k, p, slope_retention)
     w, x, z = _relative_offset(k, p)
     rate = -slope_retention * k.tan_theta[:, None] * w * w / k.mating_length
     along_along = 3 * x * (1 - x * x)
@@ -106,6 +118,23 @@ def plane_derivatives(k: FacetTables, p: Array, slope_retention: Array) -> Plane
     # derivatives of the slopes by p in the axes of the joint
     d_along = (rate * (along_along * e + along_across * _perpendicular(e)))[: dim - 1]
     d_across = (rate * (along_across * e + across_across * _perpendicular(e)))[: dim - 1]
+    return _derivatives(k, p, slope_retention, d_along, d_across)
+
+
+def retention_derivatives(k: FacetTables, p: Array, slope_retention: Array) -> PlaneDerivatives:
+    """Derivatives of the planes by the slope retention (B,), as `plane_derivatives` by p.
+
+    The axis before M has one entry. The slopes are proportional to the retention.
+    """
+    along, across, _, _ = _slopes(k, p, np.ones_like(slope_retention))
+    return _derivatives(k, p, slope_retention, along[None], across[None])
+
+
+def _derivatives(
+    k: FacetTables, p: Array, slope_retention: Array, d_along: Array, d_across: Array
+) -> PlaneDerivatives:
+    """Derivatives of the planes where those of the slopes are d_along, d_across (..., M, B)."""
+    along, across, m, N = _slopes(k, p, slope_retention)
     one = np.ones_like(along)
     zero = np.zeros_like(along)
     t = np.stack([-across, -along * across, m * m]) / (m * N)
@@ -113,13 +142,13 @@ def plane_derivatives(k: FacetTables, p: Array, slope_retention: Array) -> Plane
     t_by_along = np.stack([zero, -across, 2 * along]) / (m * N) - t * along * (m**-2 + N**-2)
     t_by_across = np.stack([-one, -along, zero]) / (m * N) - t * across / N**2
 
-    def by_p(by_along: Array, by_across: Array) -> Array:
+    def chain(by_along: Array, by_across: Array) -> Array:
         along_part = to_joint_axes(k, by_along)[:, None] * d_along
         return along_part + to_joint_axes(k, by_across)[:, None] * d_across
 
     c1 = k.c1[:, None]
-    n = c1 * by_p(np.stack([zero, one, zero]), np.stack([zero, zero, one]))
-    basis = np.stack([by_p(s_by_along, 0 * t), by_p(t_by_along, t_by_across)])
+    n = c1 * chain(np.stack([zero, one, zero]), np.stack([zero, zero, one]))
+    basis = np.stack([chain(s_by_along, 0 * t), chain(t_by_along, t_by_across)])
     return PlaneDerivatives(n, basis, c1 * (along * d_along + across * d_across) / N)
 
 

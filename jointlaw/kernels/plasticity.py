@@ -81,11 +81,33 @@ def plastic_softening(
 
     push: derivative (2, M, D, B) of q by G in slipping sliders. end: the planes after the step.
     """
-    indents = indented1.y - indented0.y > ROUNDING_TOLERANCE * indented1.y
-    indents = indents & (after.kappa > 0).any(axis=1)
-    is_own = sets_own_indentation(k, after.y, indented1.y)
+    indents = is_indented(after, indented0, indented1)
     shear = np.sum(push * np.where(after.kappa > 0, indented1.kappa, 0.0), axis=2)
     along = end.n * (k.area[:, None] * indented1.slope)
     along = along + np.einsum("edmb,emb->dmb", end.basis, shear) / k.lam
-    pressing = np.where(is_own, end.g, end.g[:, k.opposite])
+    pressing = pressing_slope(k, after, indented1, end)
     return np.einsum("imb,jmb->ijb", np.where(indents, along, 0.0), pressing)
+
+
+def normal_softening(
+    k: FacetTables, after: Cells, indented0: Cells, indented1: Cells, end: Planes
+) -> Array:
+    """Part (dim, B) by which the growth of the indentation lowers dN/dd of the contact stress N."""
+    indents = is_indented(after, indented0, indented1)
+    softening = (k.area * k.c1)[:, None] * np.where(indents, indented1.slope, 0.0)
+    pressing = pressing_slope(k, after, indented1, end)
+    return np.einsum(
+        "mb,jmb->jb", softening, np.broadcast_to(pressing, (len(pressing), *softening.shape))
+    )
+
+
+def is_indented(after: Cells, indented0: Cells, indented1: Cells) -> NDArray[np.bool_]:
+    """Whether the step indents facets (M, B) that are in touch at its end."""
+    indents = indented1.y - indented0.y > ROUNDING_TOLERANCE * indented1.y
+    return indents & (after.kappa > 0).any(axis=1)
+
+
+def pressing_slope(k: FacetTables, after: Cells, indented1: Cells, end: Planes) -> Array:
+    """Slope g (J, M, B) of the facet whose closure indents each facet: its own or the opposite."""
+    is_own = sets_own_indentation(k, after.y, indented1.y)
+    return np.where(is_own, end.g, end.g[:, k.opposite])

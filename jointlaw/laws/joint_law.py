@@ -119,6 +119,15 @@ class JointLaw(Law, kind="joint"):
         fit=(0.0, 1.0),
         log=False,
     )
+    degradation_stress: float = parameter(
+        "asperity degradation by stress: the largest contact stress so far, of the normal forces "
+        "of the asperities, that halves the slopes; with a finite mating_length. Infinite: none",
+        "Pa",
+        math.inf,
+        above=0.0,
+        infinite=True,
+        fit=(1e-3, 1e15),
+    )
     bond: Bond | None = parameter(
         "cohesion and tensile strength in parallel with the asperities", "", None, kind=Bond
     )
@@ -133,10 +142,12 @@ class JointLaw(Law, kind="joint"):
             raise ValueError(
                 f"plane = {self.plane!r}: a joint with closure_only does not shear; leave plane out"
             )
-        if self.slope_wear < math.inf and math.isinf(self.mating_length):
-            raise ValueError(
-                f"slope_wear = {self.slope_wear!r} J/m2 needs a finite mating_length (m): give it"
-            )
+        for name, unit in (("slope_wear", "J/m2"), ("degradation_stress", "Pa")):
+            value = getattr(self, name)
+            if value < math.inf and math.isinf(self.mating_length):
+                raise ValueError(
+                    f"{name} = {value!r} {unit} needs a finite mating_length (m): give it"
+                )
         with np.errstate(all="ignore"):  # a result that is not finite is refused below
             if self.closure_range is None:
                 set_value(self, "closure_range", self._default_closure_range())
@@ -268,6 +279,7 @@ class JointLaw(Law, kind="joint"):
             mating_length=self.mating_length,
             slope_wear=self.slope_wear,
             slope_residual=self.slope_residual,
+            degradation_stress=self.degradation_stress,
             lowest=self.resolution.lowest,
         )
         elements: list[Element] = [AsperityElement(asperities)]

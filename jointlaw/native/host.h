@@ -322,9 +322,12 @@ static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double 
   for (int f = 0; law->yields && f < law->facets; f++)
     valid = valid && plastic[f] >= 0.0 && plastic[f] <= law->max_effective_closure;
   if (law->yields) valid = valid && fabs(plastic[law->facets]) <= DBL_MAX;
-  if (law->degrades)
-    valid = valid && degradation[0] >= 0.0 && degradation[0] <= 1.0 && degradation[1] >= 0.0
-            && degradation[1] <= DBL_MAX;
+  if (jl_slopes_change(law)) valid = valid && degradation[0] >= 0.0 && degradation[0] <= 1.0;
+  if (law->degrades) valid = valid && degradation[1] >= 0.0 && degradation[1] <= DBL_MAX;
+  if (law->degrades_by_stress) {
+    const double peak = s[jl_peak_stress_row(law)];
+    valid = valid && peak >= 0.0 && peak <= DBL_MAX;
+  }
   jl_rows rows[JLAW_ELEMENT_ROW_NAMES];
   const int names = jl_list_rows(law, jl_element_row(law), rows);
   for (int i = 0; i < names; i++)
@@ -471,11 +474,61 @@ JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s, 
 
 /* ------------------------------------------------------------ unsheared joint */
 
+/* Sine of the inclination of a facet whose slope is tan_theta, at a contact stress over the
+ * degradation stress */
+static JLAW_FUNCTION double jlaw_degraded_sine_(const jlaw_law *law, double tan_theta,
+                                                double relative_stress)
+{
+  const double slope = tan_theta
+                       * (law->slope_residual + (1.0 - law->slope_residual) / (1.0 + relative_stress));
+  return slope / sqrt(1.0 + slope * slope);
+}
+
+/* Normal stress of asperities that degrade by stress: DegradingFacets of
+ * discretisation/first_loading_response.py */
+static JLAW_FUNCTION double jlaw_degraded_stress_(const jlaw_law *law, double closure)
+{
+  const double nodes[4][2] = {
+      /* of Gauss and Legendre on (-1, 1), one half, and weights */
+      {0.1834346424956498, 0.362683783378362},
+      {0.525532409916329, 0.31370664587788727},
+      {0.7966664774136267, 0.22238103445337448},
+      {0.9602898564975363, 0.10122853629037626}};
+  double slope, contact_stress = 0.0, friction = 0.0;
+  const double force = jlaw_first_loading_at_(law, closure, &slope);
+  for (int f = 0; f < law->facets; f++) {
+    const double y_p = jlaw_facet_value_(law, f, JLAW_YIELD_CLOSURE);
+    const double indented = law->yields ? jlaw_first_loading_at_(law, closure - y_p, &slope) : 0.0;
+    contact_stress += jlaw_facet_value_(law, f, JLAW_ENERGY_FACTOR) * (force - indented);
+  }
+  const double relative_stress = contact_stress / law->degradation_stress;
+  const double top = log1p(relative_stress);
+  for (int f = 0; f < law->facets; f++) {
+    const double y_p = jlaw_facet_value_(law, f, JLAW_YIELD_CLOSURE);
+    const double indented = law->yields ? jlaw_first_loading_at_(law, closure - y_p, &slope) : 0.0;
+    const double c1 = jlaw_facet_value_(law, f, JLAW_COS_THETA),
+                 tan_theta = jlaw_facet_value_(law, f, JLAW_TAN_THETA),
+                 A = jlaw_facet_value_(law, f, JLAW_A);
+    const double sine = jlaw_degraded_sine_(law, tan_theta, relative_stress);
+    double mean = top > 0.0 ? 0.0 : sine;
+    for (int i = 0; top > 0.0 && i < 8; i++) {
+      const double x = 0.5 * (i < 4 ? 1.0 - nodes[i][0] : 1.0 + nodes[i - 4][0]);
+      mean += exp(x * top) * (0.5 * nodes[i % 4][1] * top / relative_stress)
+              * jlaw_degraded_sine_(law, tan_theta, expm1(x * top));
+    }
+    const double stick = mean * force * law->stiffness_ratio / c1;
+    const double slip = law->mu * c1 * (force - indented) / sqrt(1.0 - sine * sine);
+    friction += A * sine * (stick < slip ? stick : slip);
+  }
+  return contact_stress + friction;
+}
+
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
   double slope, yield_correction = 0.0;
   if (!(closure <= law->max_effective_closure)) return NAN;
-  for (int f = 0; law->yields && f < law->facets; f++) /* less stress by yielding */
+  for (int f = 0; law->yields && !law->degrades_by_stress && f < law->facets;
+       f++) /* less stress by yielding */
     for (int i = JLAW_YIELD_CORRECTION; i < JLAW_YIELD_CORRECTION + 4; i += 2) {
       const double depth = jlaw_facet_value_(law, f, i + 1);
       yield_correction +=
@@ -485,6 +538,7 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       law->asperities
           ? law->normal_stress_factor * jlaw_first_loading_at_(law, closure, &slope) - yield_correction
           : 0.0;
+  if (law->degrades_by_stress) stress = jlaw_degraded_stress_(law, closure);
 #define JL_FIRST(name)                                                          \
   if (law->name) {                                                              \
     jl_element_step p = {{0.0}, {closure, 0.0, 0.0}, {0.0}, {0.0}, {0.0}, 0.0}; \

@@ -11,7 +11,9 @@
  *   dissipated energy    J/m2
  *   q_s, q_t (M D each)  of all cells of all facets
  *   z (M), plastic work  if asperities yield: plastic indentation of every facet (m), J/m2
- *   lost slopes, work    if asperities degrade: 1 - slope retention, and the shear work behind it
+ *   lost slopes          if asperities degrade: 1 - slope retention
+ *   shear work           if it degrades asperities, J/m2
+ *   peak contact stress  if it degrades asperities: the largest so far, Pa
  *   rows of elements.h   bond or Coulomb's law
  * A batch stores behind them Phi and Phi' of every facet (M each), and, if asperities yield, the same
  * at z: batch.c.
@@ -27,7 +29,7 @@
  * on the C library; exp and log are not used, because zig links versions of its own. */
 
 typedef struct { /* constants of a step, which let the compiler omit unused parts */
-  int dim, yields, interlock_decays, degrades, tangent, track_dissipation;
+  int dim, yields, interlock_decays, degrades, degrades_by_stress, tangent, track_dissipation;
   int curve_stored; /* whether Phi and Phi' are stored behind the state */
 } jl_step_kind;
 
@@ -39,7 +41,10 @@ typedef struct {                /* a joint in a step */
   jl_joint_real p[3];           /* increment */
   jl_joint_real from[3], to[3]; /* closure and in-plane displacement before and after */
   jl_offset start, middle, end;
-  jl_joint_real slopes0, slopes1; /* slope retention before the step and in it */
+  /* slope retention: before the step; after degradation by work; at mid-step and at the end, after
+   * degradation by stress */
+  jl_joint_real slopes0, slopes1, slopes_middle, slopes_end;
+  jl_joint_real retention_rate; /* derivative of slopes_end by the contact stress at fixed slopes */
 } jl_joint_step;
 
 typedef struct { /* planes of facets: slope along the azimuth e and across it, in axes (1, e) */
@@ -81,6 +86,9 @@ typedef struct { /* sums over facets */
   jl_real plastic_work;
   jl_real degradation_normal, degradation_sliders; /* energy dissipated by degradation */
   jl_real shear0[2];                               /* shear stress before the step, after it */
+  jl_real slope_energy_rate; /* of the normal springs, by the retention: before plus after */
+  jl_real by_retention[3];   /* derivative of F by slopes_end */
+  jl_real contact_rate[3];   /* derivative of the contact stress by d, at fixed slopes */
 } jl_step_sums;
 
 /* Rows of a state: the first row of each part, and their number */
@@ -93,9 +101,17 @@ JL_INLINE int jl_degradation_row(const jlaw_law *law)
 {
   return jl_plastic_row(law) + (law->yields ? law->facets + 1 : 0);
 }
+JL_INLINE int jl_slopes_change(const jlaw_law *law)
+{
+  return law->degrades || law->degrades_by_stress;
+}
+JL_INLINE int jl_peak_stress_row(const jlaw_law *law)
+{
+  return jl_degradation_row(law) + 1 + law->degrades;
+}
 JL_INLINE int jl_element_row(const jlaw_law *law)
 {
-  return jl_degradation_row(law) + 2 * law->degrades;
+  return jl_degradation_row(law) + jl_slopes_change(law) + law->degrades + law->degrades_by_stress;
 }
 JL_INLINE int jl_state_rows(const jlaw_law *law)
 {
@@ -344,6 +360,14 @@ JL_INLINE void jl_slope_derivatives(const jlaw_law *law, const double *f, const 
   h[2] = scale * (s->x * (1.0 - 3.0 * s->z * s->z));
 }
 
+/* Slopes along e and across it at a slope retention of 1. w: as in jl_offset */
+JL_INLINE void jl_full_slopes(const double *f, const jl_plane *s, jl_joint_real w, jl_real full[2])
+{
+  const jl_real tan_theta = w * jl_column(f, JLAW_TAN_THETA);
+  full[0] = tan_theta * (1.0 - s->x * s->x);
+  full[1] = -tan_theta * s->x * s->z;
+}
+
 /* Project the increment on the plane of facets at mid-step */
 JL_INLINE void jl_project_increment(const double *f, const jl_joint_step *m, jl_facet_step *o)
 {
@@ -391,19 +415,143 @@ JL_INLINE void jl_add_facet_traction(const jlaw_law *law, const double *f, const
 
 /* ------------------------------------------------------------- asperity degradation */
 
+/* Weight w of the factor u in the retention, s + w u, at this shear work */
+JL_INLINE double jl_stress_weight(const jlaw_law *law, double work)
+{
+  return (1.0 - law->slope_residual) * (1.0 + expm1(-work / law->slope_wear));
+}
+
 /* Slope retention before the step and after degradation by the shear work done so far */
-JL_INLINE void jl_degrade_slopes(const jlaw_law *law, jl_states n, jl_joint_step *m)
+JL_INLINE void jl_degrade_slopes(const jlaw_law *law, jl_states n, jl_joint_step *m, jl_step_kind k)
 {
   const int row = jl_degradation_row(law);
   jl_joint_real lost = jl_load_joint(n, row);
   const jl_joint_real work = jl_load_joint(n, row + 1);
+  const jl_joint_real peak =
+      k.degrades_by_stress ? jl_load_joint(n, jl_peak_stress_row(law)) : jl_broadcast_joint(0.0);
   m->slopes0 = 1.0 - lost;
   for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
-    const double loss = (law->slope_residual - 1.0) * expm1(-JL_JOINT(work, l) / law->slope_wear);
+    double loss = (law->slope_residual - 1.0) * expm1(-JL_JOINT(work, l) / law->slope_wear);
+    if (k.degrades_by_stress) {
+      const double u = 1.0 / (1.0 + JL_JOINT(peak, l) / law->degradation_stress);
+      loss += jl_stress_weight(law, JL_JOINT(work, l)) * (1.0 - u);
+    }
     JL_JOINT(lost, l) = loss > JL_JOINT(lost, l) ? loss : JL_JOINT(lost, l);
   }
   m->slopes1 = 1.0 - lost;
   jl_store_joint(n, row, lost);
+}
+
+/* Climb x of facets at full slopes: y = closure + slopes x */
+JL_INLINE jl_real jl_climb(const jlaw_law *law, const double *f, const jl_offset *at)
+{
+  return law->mating_length
+         * (jl_column(f, JLAW_M + 1) * at->o[0] + jl_column(f, JLAW_M + 2) * at->o[1]);
+}
+
+/* Contact stress N at the end of the step, the stress that the normal forces of the asperities bear,
+ * with this slope retention, and its derivative by the retention */
+JL_INLINE void jl_contact_stress(const jlaw_law *law, jl_states n, const jl_joint_step *m,
+                                 jl_joint_real slopes, jl_step_kind k, jl_joint_real *stress,
+                                 jl_joint_real *rate)
+{
+  const int M = law->facets;
+  struct {
+    jl_real stress, rate;
+  } sum[JL_PARTIAL_SUMS];
+  for (int i = 0; i < JL_PARTIAL_SUMS; i++) sum[i].stress = sum[i].rate = jl_broadcast(0.0);
+  for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
+    const int i = at / JL_FACETS_PER_PASS % JL_PARTIAL_SUMS,
+              count = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
+    const double *f = jl_facet_table(law, at);
+    const jl_real x = jl_climb(law, f, &m->end), y = m->to[0] + slopes * x;
+    if (!jl_any(y > 0.0)) continue;
+    jl_real force, slope;
+    jl_first_loading_curve(law, jl_flush_underflow(y), &force, &slope, (jl_real *) 0);
+    jl_real growth = slope * x;
+    if (k.yields) {
+      const jl_facet_real y_p = jl_column(f, JLAW_YIELD_CLOSURE);
+      const jl_real z0 = jl_load(n, jl_plastic_row(law) + at, 1, count);
+      const jl_real opposite = 2.0 * jl_column(f, JLAW_M) * m->to[0] - y;
+      const jl_real z = jl_max(jl_max(y, opposite) - y_p, z0);
+      const jl_mask own = y - y_p >= z - JLAW_ROUNDING_TOLERANCE * jl_abs(y);
+      jl_real fz, kz;
+      jl_first_loading_curve(law, z, &fz, &kz, (jl_real *) 0);
+      jl_subtract_plastic_force(y, z, fz, &force, &slope);
+      growth = slope * x - jl_select_or_zero(z > z0, kz * jl_select(own, x, -x));
+      growth = jl_select_or_zero(force > 0.0, growth);
+    }
+    sum[i].stress += jl_column(f, JLAW_ENERGY_FACTOR) * force;
+    sum[i].rate += jl_column(f, JLAW_ENERGY_FACTOR) * growth;
+  }
+  *stress = jl_total(sum, stress);
+  *rate = jl_total(sum, rate);
+}
+
+typedef struct { /* search for the factor u of the slopes of one joint */
+  double u, low, high, weight;
+  int exceeds, searches; /* whether the contact stress is the largest so far; whether to go on */
+} jl_stress_search;
+
+/* Next u by Newton's method, or by bisection: u N(s + w u) - S (1 - u) = 0 */
+JL_INLINE void jl_search_stress_factor(double S, double stress, double rate, jl_stress_search *at)
+{
+  const double u = at->u, excess = u * stress - S * (1.0 - u);
+  if (excess > 0.0) at->high = u;
+  else at->low = u;
+  double next = u - excess / (stress + u * at->weight * rate + S);
+  if (!(next > at->low && next < at->high)) next = 0.5 * (at->low + at->high);
+  at->searches = at->searches && fabs(next - u) > JLAW_FACTOR_CONVERGENCE * u;
+  if (at->searches) at->u = next;
+}
+
+/* Slope retention at the end of the step, which belongs to the contact stress there: "Asperity
+ * degradation by stress" */
+JL_INLINE void jl_degrade_by_stress(const jlaw_law *law, jl_states n, jl_joint_step *m,
+                                    jl_step_kind k)
+{
+  const double S = law->degradation_stress;
+  const int row = jl_degradation_row(law);
+  jl_joint_real lost = jl_load_joint(n, row), peak = jl_load_joint(n, jl_peak_stress_row(law));
+  const jl_joint_real lost1 = lost,
+                      work = k.degrades ? jl_load_joint(n, row + 1) : jl_broadcast_joint(0.0);
+  jl_joint_real stress, rate;
+  jl_stress_search search[JL_JOINTS_PER_PASS];
+  int searches = 0;
+  jl_contact_stress(law, n, m, 1.0 - lost, k, &stress, &rate);
+  for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+    jl_stress_search *at = search + l;
+    at->exceeds = at->searches = JL_JOINT(stress, l) > JL_JOINT(peak, l);
+    at->u = at->high = 1.0 / (1.0 + JL_JOINT(peak, l) / S);
+    at->low = 0.0;
+    at->weight = at->exceeds ? jl_stress_weight(law, JL_JOINT(work, l)) : 0.0;
+    searches = searches || at->searches;
+  }
+  for (int i = 0; i < JLAW_MAX_FACTOR_ITERATIONS && searches; i++) {
+    searches = 0;
+    for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+      jl_stress_search *at = search + l;
+      if (!at->exceeds) continue;
+      jl_search_stress_factor(S, JL_JOINT(stress, l), JL_JOINT(rate, l), at);
+      const double loss = 1.0 - law->slope_residual - at->weight * at->u;
+      JL_JOINT(lost, l) = loss > JL_JOINT(lost1, l) ? loss : JL_JOINT(lost1, l);
+      searches = searches || at->searches;
+    }
+    jl_contact_stress(law, n, m, 1.0 - lost, k, &stress, &rate);
+  }
+  m->retention_rate = jl_broadcast_joint(0.0);
+  for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+    const jl_stress_search *at = search + l;
+    const double u = at->u;
+    if (at->exceeds && JL_JOINT(stress, l) > JL_JOINT(peak, l))
+      JL_JOINT(peak, l) = JL_JOINT(stress, l);
+    if (JL_JOINT(lost, l) > JL_JOINT(lost1, l))
+      JL_JOINT(m->retention_rate, l) = -at->weight / (S / (u * u) + at->weight * JL_JOINT(rate, l));
+  }
+  m->slopes_end = 1.0 - lost;
+  m->slopes_middle = 0.5 * (m->slopes1 + m->slopes_end);
+  jl_store_joint(n, row, lost);
+  jl_store_joint(n, jl_peak_stress_row(law), peak);
 }
 
 /* Slider forces after degradation: springs that disengage release their force, and the friction limit
@@ -659,18 +807,26 @@ JL_INLINE void jl_add_decaying_tangent(const jlaw_law *law, const double *f, con
   const jl_plane *s = &o->end, *r = &o->middle;
   const jl_real ratio = jl_broadcast(law->stiffness_ratio), none = jl_broadcast(0.0),
                 n = jl_broadcast(jl_column(f, JLAW_ENERGY_FACTOR));
-  jl_real h[3], H[3], C[3][3]; /* ee, ez, zz */
-  jl_slope_derivatives(law, f, s, m->end.w, m->slopes1, h);
-  jl_slope_derivatives(law, f, r, m->middle.w, m->slopes1, H);
+  const int columns = k.degrades_by_stress ? 4 : 3; /* the last one: by the slope retention */
+  jl_real h[3], H[3], C[3][4]; /* ee, ez, zz */
+  jl_slope_derivatives(law, f, s, m->end.w, m->slopes_end, h);
+  jl_slope_derivatives(law, f, r, m->middle.w, m->slopes_middle, H);
   const jl_real turn = 0.5 * (o->d0 + r->along * o->de), et = 0.5 * o->et;
   const jl_real rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
   const jl_real ea = -turn * (rm2 * r->inv_m), eb = -(turn * r->inv_mN + et * r->across * rN2);
   const jl_real ta =
       (r->along * o->dz - 0.5 * r->across * o->de) * r->inv_mN - et * r->along * (rm2 + rN2);
-  const jl_real Es[3] = {-r->along * r->inv_m, r->inv_m + ea * H[0], ea * H[1]};
-  const jl_real Et[3] = {-r->across * r->inv_mN,
+  jl_real full[2] = {none, none}, full_middle[2] = {none, none}; /* slopes at a retention of 1 */
+  if (k.degrades_by_stress) {
+    jl_full_slopes(f, s, m->end.w, full);
+    jl_full_slopes(f, r, m->middle.w, full_middle);
+  }
+  const jl_real Es[4] = {-r->along * r->inv_m, r->inv_m + ea * H[0], ea * H[1],
+                         ea * full_middle[0]};
+  const jl_real Et[4] = {-r->across * r->inv_mN,
                          -r->along * r->across * r->inv_mN + ta * H[0] + eb * H[1],
-                         r->m2 * r->inv_mN + ta * H[1] + eb * H[2]};
+                         r->m2 * r->inv_mN + ta * H[1] + eb * H[2],
+                         ta * full_middle[0] + eb * full_middle[1]};
   const jl_real cs[3] = {-s->along * s->inv_m, s->inv_m, none};
   const jl_real ct[3] = {-s->across * s->inv_mN, -s->along * s->across * s->inv_mN,
                          s->m2 * s->inv_mN};
@@ -682,9 +838,12 @@ JL_INLINE void jl_add_decaying_tangent(const jlaw_law *law, const double *f, con
   const jl_real down = o->qt * s->across * rn2;
   const jl_real B[3] = {-qt - down * ct[0], -s->along * qt - down * ct[1], -down * ct[2]};
   const jl_real ga = s->along * rn2, gb = s->across * rn2; /* of log(gamma) */
-  const jl_real g[3] = {jl_broadcast(1.0), s->along, s->across};
-  for (int j = 0; j < 3; j++) {
-    const jl_real ha = j ? h[j - 1] : none, hb = j ? h[j] : none, gamma = ga * ha + gb * hb;
+  const jl_real g[4] = {jl_broadcast(1.0), s->along, s->across,
+                        k.degrades_by_stress ? jl_climb(law, f, &m->end) : none};
+  jl_real contact_rate[3];
+  for (int j = 0; j < columns; j++) {
+    const jl_real ha = j == 3 ? full[0] : j ? h[j - 1] : none,
+                  hb = j == 3 ? full[1] : j ? h[j] : none, gamma = ga * ha + gb * hb;
     const jl_real us = o->vs * g[j] + o->bss * Es[j] + o->bst * Et[j] + o->gs * gamma;
     const jl_real ut = o->vt * g[j] + o->bst * Es[j] + o->btt * Et[j] + o->gt * gamma;
     const jl_real g_z =
@@ -695,9 +854,17 @@ JL_INLINE void jl_add_decaying_tangent(const jlaw_law *law, const double *f, con
                 + ratio * (cs[i] * us + ct[i] * ut + (A[i] * ha + B[i] * hb));
       if (k.yields) C[i][j] -= g_z * (n * g[i] * o->kz1 + ratio * (cs[i] * o->ws + ct[i] * o->wt));
     }
+    if (k.degrades_by_stress && j < 3) contact_rate[j] = n * (o->k1 * g[j] - g_z * o->kz1);
   }
   for (int i = 0; i < 3; i++) jl_to_joint_axes(f, &C[i][1], &C[i][2]);
-  for (int j = 0; j < 3; j++) jl_to_joint_axes(f, &C[1][j], &C[2][j]);
+  for (int j = 0; j < columns; j++) jl_to_joint_axes(f, &C[1][j], &C[2][j]);
+  if (k.degrades_by_stress) {
+    jl_to_joint_axes(f, &contact_rate[1], &contact_rate[2]);
+    for (int i = 0; i < k.dim; i++) {
+      sum->by_retention[i] += C[i][3];
+      sum->contact_rate[i] += contact_rate[i];
+    }
+  }
   for (int i = 0; i < k.dim; i++)
     for (int j = 0; j < k.dim; j++) sum->C[3 * i + j] += C[i][j];
 }
@@ -721,7 +888,7 @@ JL_INLINE void jl_step_facets(const jlaw_law *law, int at, const jl_joint_step *
   }
   if (k.interlock_decays) {
     o.y0 = jl_effective_closure(law, f, m->from[0], &m->start, m->slopes1);
-    o.y1 = jl_effective_closure(law, f, m->to[0], &m->end, m->slopes1);
+    o.y1 = jl_effective_closure(law, f, m->to[0], &m->end, m->slopes_end);
   }
   o.yw = k.degrades
              ? jl_flush_underflow(jl_effective_closure(law, f, m->from[0], &m->start, m->slopes0))
@@ -731,8 +898,8 @@ JL_INLINE void jl_step_facets(const jlaw_law *law, int at, const jl_joint_step *
     return; /* separated: no force */
   }
   if (k.interlock_decays) {
-    o.middle = jl_plane_at(f, &m->middle, m->slopes1);
-    o.end = jl_plane_at(f, &m->end, m->slopes1);
+    o.middle = jl_plane_at(f, &m->middle, m->slopes_middle);
+    o.end = jl_plane_at(f, &m->end, m->slopes_end);
     jl_project_increment(f, m, &o);
   }
   const jl_facet_real limit = jl_column(f, JLAW_FRICTION_LIMIT) * jl_column(f, JLAW_COS_THETA);
@@ -793,6 +960,10 @@ JL_INLINE void jl_step_facets(const jlaw_law *law, int at, const jl_joint_step *
     jl_facet_traction(law, f, &start, o.f0, o.us, o.ut, F);
     sum->shear0[0] += F[1], sum->shear0[1] += F[2];
   }
+  if (k.degrades_by_stress)
+    sum->slope_energy_rate +=
+        jl_column(f, JLAW_ENERGY_FACTOR)
+        * (jl_climb(law, f, &m->start) * o.f0 + jl_climb(law, f, &m->end) * o.f1);
   jl_add_facet_traction(law, f, &o.end, o.f1, o.qs, o.qt, k.dim, k.interlock_decays, sum->F);
   if (!k.tangent) return;
   if (k.interlock_decays) jl_add_decaying_tangent(law, f, m, &o, sum, k);
@@ -824,18 +995,24 @@ JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3
     m.to[i] = m.from[i] + m.p[i];
   }
   m.slopes0 = m.slopes1 = jl_broadcast_joint(1.0);
-  if (k.degrades) jl_degrade_slopes(law, n, &m);
+  if (k.degrades) jl_degrade_slopes(law, n, &m, k);
+  else if (k.degrades_by_stress) m.slopes0 = m.slopes1 = 1.0 - jl_load_joint(n, jl_degradation_row(law));
   if (k.interlock_decays) {
     m.start = jl_offset_at(law, m.from[1], m.from[2]);
     m.middle = jl_offset_at(law, m.from[1] + 0.5 * m.p[1], m.from[2] + 0.5 * m.p[2]);
     m.end = jl_offset_at(law, m.to[1], m.to[2]);
   }
+  m.slopes_middle = m.slopes_end = m.slopes1;
+  if (k.degrades_by_stress) jl_degrade_by_stress(law, n, &m, k);
   for (int i = 0; i < JL_PARTIAL_SUMS; i++) {
     for (int j = 0; j < 3; j++) sum[i].F[j] = jl_broadcast(0.0);
     for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = jl_broadcast(0.0);
     sum[i].loss = sum[i].plastic_work = sum[i].degradation_normal = sum[i].degradation_sliders =
         jl_broadcast(0.0);
     sum[i].shear0[0] = sum[i].shear0[1] = jl_broadcast(0.0);
+    for (int j = 0; k.degrades_by_stress && j < 3; j++)
+      sum[i].by_retention[j] = sum[i].contact_rate[j] = jl_broadcast(0.0);
+    sum[i].slope_energy_rate = jl_broadcast(0.0);
   }
   jl_measure_sums measures[JL_PARTIAL_SUMS];
   for (int i = 0; all && i < JL_PARTIAL_SUMS; i++) measures[i] = jl_zero_measures();
@@ -849,6 +1026,10 @@ JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3
     for (int j = 0; k.tangent && j < dim; j++) C[dim * i + j] = jl_total(sum, C[3 * i + j]);
     jl_store_joint(n, i, m.to[i]);
   }
+  for (int i = 0; k.degrades_by_stress && k.tangent && i < dim; i++)
+    for (int j = 0; j < dim; j++)
+      C[dim * i + j] +=
+          jl_total(sum, by_retention[i]) * (m.retention_rate * jl_total(sum, contact_rate[j]));
   if (!k.track_dissipation) return;
   jl_joint_real dissipated = jl_total(sum, loss);
   if (k.degrades) {
@@ -864,6 +1045,13 @@ JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3
     jl_store_joint(n, jl_degradation_row(law) + 1,
                    jl_load_joint(n, jl_degradation_row(law) + 1) + work);
     dissipated += jl_total(sum, degradation_sliders) + normal;
+  }
+  if (k.degrades_by_stress) {
+    jl_joint_real normal =
+        0.5 * jl_total(sum, slope_energy_rate) * (m.slopes1 - m.slopes_end);
+    for (int l = 0; l < JL_JOINTS_PER_PASS; l++) /* >= 0, but for rounding */
+      JL_JOINT(normal, l) = JL_JOINT(normal, l) > 0.0 ? JL_JOINT(normal, l) : 0.0;
+    dissipated += normal;
   }
   if (k.yields) {
     const jl_joint_real plastic_work = jl_total(sum, plastic_work);
@@ -883,7 +1071,7 @@ JL_INLINE void jl_evaluate_facets(const jlaw_law *law, jl_states n, int at, jl_f
   const double *f = jl_facet_table(law, at);
   jl_joint_real slopes = jl_broadcast_joint(1.0), to[3];
   for (int i = 0; i < 3; i++) to[i] = i < law->dim ? jl_load_joint(n, i) : jl_broadcast_joint(0.0);
-  if (law->degrades) slopes = 1.0 - jl_load_joint(n, jl_degradation_row(law));
+  if (jl_slopes_change(law)) slopes = 1.0 - jl_load_joint(n, jl_degradation_row(law));
   o->y1 = o->z1 = o->fz1 = o->kz1 = jl_broadcast(0.0);
   o->strength = jl_broadcast(jl_column(f, JLAW_FRICTION_LIMIT));
   for (int i = 0; i < law->dim && !law->interlock_decays; i++)
@@ -956,7 +1144,7 @@ JL_INLINE void jl_traction(const jlaw_law *law, jl_states n, jl_joint_real F[3])
   jl_joint_real delta[3], slopes = jl_broadcast_joint(1.0);
   for (int i = 0; i < 3; i++)
     delta[i] = i < dim ? jl_load_joint(n, i) : jl_broadcast_joint(0.0);
-  if (law->degrades) slopes = 1.0 - jl_load_joint(n, jl_degradation_row(law));
+  if (jl_slopes_change(law)) slopes = 1.0 - jl_load_joint(n, jl_degradation_row(law));
   for (int i = 0; i < JL_PARTIAL_SUMS; i++)
     for (int j = 0; j < 3; j++) sum[i].F[j] = jl_broadcast(0.0);
   for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
@@ -1043,14 +1231,14 @@ JL_INLINE jl_joint_real jl_stiffness_bound(const jlaw_law *law, jl_states n)
   JL_DEFINE_STEP(name, 0, 0, __VA_ARGS__)            \
   JL_DEFINE_STEP(name##_measured, 0, 1, __VA_ARGS__) \
   JL_DEFINE_STEP(name##_C, 1, 0, __VA_ARGS__)
-JL_DEFINE_STEPS(plane, 2, 0, 0, 0)
-JL_DEFINE_STEPS(plane_decaying, 2, 0, 1, 0)
-JL_DEFINE_STEPS(plane_degrading, 2, 0, 1, 1)
-JL_DEFINE_STEPS(space, 3, 0, 0, 0)
-JL_DEFINE_STEPS(space_decaying, 3, 0, 1, 0)
-JL_DEFINE_STEPS(space_degrading, 3, 0, 1, 1)
-JL_DEFINE_STEPS(general, law->dim, law->yields, 0, 0) /* asperities yield, or closure only */
-JL_DEFINE_STEPS(general_decaying, law->dim, law->yields, 1, law->degrades)
+JL_DEFINE_STEPS(plane, 2, 0, 0, 0, 0)
+JL_DEFINE_STEPS(plane_decaying, 2, 0, 1, 0, 0)
+JL_DEFINE_STEPS(plane_degrading, 2, 0, 1, 1, 0)
+JL_DEFINE_STEPS(space, 3, 0, 0, 0, 0)
+JL_DEFINE_STEPS(space_decaying, 3, 0, 1, 0, 0)
+JL_DEFINE_STEPS(space_degrading, 3, 0, 1, 1, 0)
+JL_DEFINE_STEPS(general, law->dim, law->yields, 0, 0, 0) /* asperities yield, or closure only */
+JL_DEFINE_STEPS(general_decaying, law->dim, law->yields, 1, law->degrades, law->degrades_by_stress)
 
 /* Advance joints with all their elements by the step of their kind. Measures are written unless `all`
  * is NULL, which it must be for a tangent. */
@@ -1069,7 +1257,8 @@ JL_INLINE void jl_step_of_kind(const jlaw_law *law, jl_states n, const jl_joint_
       jl_step_##name##_measured(law, n, d, F, C, track_dissipation, curve_stored, all);     \
     else jl_step_##name(law, n, d, F, C, track_dissipation, curve_stored, all);             \
   }
-  if (law->interlock_decays && (yields || dim == 1 || (degrades && !JL_BATCH)))
+  if (law->interlock_decays
+      && (yields || dim == 1 || law->degrades_by_stress || (degrades && !JL_BATCH)))
     JL_STEP(general_decaying)
   else if (yields || dim == 1) JL_STEP(general)
   else if (JL_BATCH && dim == 2 && degrades) JL_STEP(plane_degrading)

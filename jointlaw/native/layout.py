@@ -30,7 +30,7 @@ from typing import NamedTuple
 from ..support import thresholds
 
 HERE = Path(__file__).parent
-TABLE_FORMAT = 5  # version of the table files: increase it with every change of this layout
+TABLE_FORMAT = 6  # version of the table files: increase it with every change of this layout
 FACET_LANES = 4  # facets that lie side by side in a block of the tables
 MAX_AZIMUTHS = 512  # facets of one inclination
 LARGEST_FLOAT = sys.float_info.max  # represents infinity, which table files cannot hold
@@ -65,6 +65,7 @@ INTEGERS = {
     "yields": Field("0", "1", "whether asperities are elastic-perfectly plastic"),
     "interlock_decays": Field("0", "1", "whether dilation decays with slip"),
     "degrades": Field("0", "1", "whether asperities degrade under shear work"),
+    "degrades_by_stress": Field("0", "1", "whether asperities degrade by the contact stress"),
     "asperities": Field("0", "1", "whether the joint has asperities"),
     "bonded": Field("0", "1", "whether the joint has a cohesive bond"),
     "coulomb": Field("0", "1", "whether the joint follows Coulomb's law"),
@@ -84,6 +85,7 @@ REALS = {
     "mating_length": Field("0", "DBL_MAX", "m; infinite: the largest float"),
     "slope_wear": Field("0", "DBL_MAX", "J/m2; infinite: the largest float"),
     "slope_residual": Field("0", "1", "fraction of the slopes that never degrades"),
+    "degradation_stress": Field("0", "DBL_MAX", "Pa; infinite: the largest float"),
     "first_touch_closure": Field("-DBL_MAX", "0", "m: closure at which an unmated joint touches"),
     "eta": Field("0", "DBL_MAX", "exponent of the first-loading curve"),
     "curve_scale": Field("0", "DBL_MAX", "V of the first-loading curve, m^(1/2)"),

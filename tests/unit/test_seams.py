@@ -82,13 +82,20 @@ def test_kernels_measures_and_bounds_agree(pair):
 
 
 def test_first_loading(pair):
-    """In one step or in many; within what few cells slip later where asperities yield."""
+    """In one step or in many.
+
+    Few cells slip later where asperities yield, by up to 0.2 %. Where slopes decrease by stress,
+    one step turns the planes once for all of their change: its friction differs by up to 3 %, which
+    is 0.3 % of the normal stress.
+    """
     law, _ = pair
+    facets = law.tables.asperities
+    degrades = facets is not None and facets.degrades_by_stress
     for closure, parts in ((0.3e-6, 1), (1e-6, 1), (1e-6, 7)):
         joint, start = law.joint(), np.eye(law.dim)[0]
         for _ in range(parts):
             F, _ = joint.update(closure / parts * start)
-        few = 2e-3 if law.tables.yields else 1e-9
+        few = 5e-3 if degrades else 2e-3 if law.tables.yields else 1e-9
         assert F[0] == pytest.approx(law.normal_stress(closure), rel=few)
         assert law.closure(law.normal_stress(closure)) == pytest.approx(closure, rel=1e-9)
 

@@ -68,7 +68,7 @@ def degraded(k, state):
     if facets.degrades:
         old = kernel.state_parts(k, state)
         new = kernel.state_parts(k, new_state)
-        new.lost_slopes[:] = degrade_slopes(facets, old.lost_slopes, old.shear_work)
+        new.lost_slopes[:] = degrade_slopes(facets, old)
         new.q[:], dissipation = asperities.degrade(facets, old.delta, old, 1 - new.lost_slopes)
         new.dissipated_energy[:] += dissipation
     return new_state
@@ -82,21 +82,23 @@ def states_along(k, state, d):
     return np.hstack(states)
 
 
-def work_on_step_geometry(k, states, d, exact):
+def work_on_step_geometry(k, states, d, end_slopes, exact):
     """Work (n,) along steps d (dim, n) from degraded states (rows, n), to about exact (n,).
 
     The planes are constant in a step, and y varies linearly: docs/theory-incremental.md,
-    "Dissipation is non-negative along the geometry of the step".
+    "Dissipation is non-negative along the geometry of the step". Where slopes decrease by stress,
+    to the retention end_slopes (n,), this is the external work less the energy that normal springs
+    dissipate as slopes decrease.
     """
     old = kernel.state_parts(k, states)
     facets = k.asperities
     slopes = old.slope_retention
     p0 = old.delta[1:]
     p1 = p0 + d[1:]
-    middle = planes(facets, 0.5 * (p0 + p1), slopes)
-    gamma = np.maximum(planes(facets, p0, slopes).gamma, planes(facets, p1, slopes).gamma)
+    middle = planes(facets, 0.5 * (p0 + p1), 0.5 * (slopes + end_slopes))
+    gamma = np.maximum(planes(facets, p0, slopes).gamma, planes(facets, p1, end_slopes).gamma)
     y0 = asperities.effective_closure(facets, old.delta, slopes)
-    y1 = asperities.effective_closure(facets, old.delta + d, slopes)
+    y1 = asperities.effective_closure(facets, old.delta + d, end_slopes)
     limit = asperities.friction_limit(facets, np.broadcast_to(gamma, y0.shape))
     in_plane = np.einsum("edmb,db->emb", middle.basis, d)
 

@@ -83,7 +83,8 @@ def tables(law: Law) -> bytes:
     """
     numbers, arrays = packed(law)
     if numbers["dim"] != 3 or any(
-        numbers[name] for name in ("yields", "degrades", "curve_exponent", *ELEMENTS)
+        numbers[name]
+        for name in ("yields", "degrades", "degrades_by_stress", "curve_exponent", *ELEMENTS)
     ):
         raise ValueError("joint.c supports elastic laws in space that consist of asperities only")
     head = bytes(LawStruct(**numbers))[: LawStruct.facet.offset]

@@ -4,9 +4,8 @@ import numpy as np
 
 from jointlaw.kernels import asperities
 from jointlaw.kernels import reference as kernel
-from jointlaw.kernels.asperities import effective_closure
 from jointlaw.kernels.cells import evaluate_cells
-from jointlaw.kernels.interlock import offset, planes
+from jointlaw.kernels.interlock import effective_closure, offset, planes
 from jointlaw.kernels.plasticity import subtract_plastic
 
 ROUNDING = 1e-12  # of the facet's normal force: G of a cell is a difference of such forces

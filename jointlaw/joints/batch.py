@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..kernels.admissible import require_admissible_states
 from ..kernels.element import Measures
 from ..kernels.engine import JOINTS_PER_BLOCK, Step, allocate_blocks, block_index, engine
 from ..support.checks import Array, finite, integer, numbers
@@ -123,7 +124,8 @@ class JointBatch:
         """Return to a snapshot; with `where` only these joints.
 
         Joints move between batches by `other.restore(batch.snapshot(where), places)`. Raises
-        ValueError if another law wrote the state or it holds another number of joints.
+        ValueError if another law wrote the state, it holds another number of joints, or a number
+        beyond its bounds (`jointlaw.kernels.admissible`); all joints are then as they were.
         """
         index = None if where is None else self._index(where)
         if not isinstance(state, JointState):
@@ -136,8 +138,7 @@ class JointBatch:
                 f"state holds {len(state)} joints, for {n} of the batch: resize it, or "
                 "name as many by where"
             )
-        if not np.isfinite(state.values).all():
-            raise ValueError("state holds values that are not finite; it is damaged")
+        require_admissible_states(self.law.tables, state.values)
         values = state.values
         if index is None:
             lanes = self._state.shape[2]

@@ -82,6 +82,8 @@ def load_state(path: str | Path) -> JointState:
             values = data["values"]
         if values.ndim != 2 or values.dtype.kind != "f":
             raise ValueError("values is no table of numbers")
+        if not np.isfinite(values).all():
+            raise ValueError("values holds numbers that are not finite")
     except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not a saved joint state: {error}") from None
     return JointState(fingerprint, np.array(values.T, float, order="C"))

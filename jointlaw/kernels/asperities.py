@@ -23,6 +23,7 @@ and what degrades them: the shear work (1), the largest contact stress (1), see 
 the interlock decays, planes of facets rotate with slip, see interlock.py.
 """
 
+import math
 from functools import cached_property
 from typing import NamedTuple
 
@@ -121,6 +122,12 @@ class AsperityElement(Element):
         finite = max_effective_closure(k.curve, k.area, k.theta, k.asperity)
         self.max_effective_closure = min(finite, MAX_SLIP * k.mating_length)
         self.max_search_closure = self.first_loading.max_search_closure
+        self.row_bounds = {
+            "indentation": (0.0, self.max_effective_closure),
+            "lost_slopes": (0.0, 1.0),
+            "shear_work": (0.0, math.inf),
+            "peak_contact_stress": (0.0, math.inf),
+        }
 
     def numbers(self) -> dict[str, float]:
         """Scalars of `struct jlaw_law` that belong to asperities, by their names in C."""

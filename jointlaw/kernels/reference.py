@@ -17,6 +17,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..discretisation.tables import FacetTables
+from ..native.layout import LARGEST_FLOAT
 from ..support.checks import Array
 from .asperities import AsperityElement
 from .element import Element, Measures
@@ -69,6 +70,22 @@ class LawTables:
     def rows(self) -> int:
         """Numbers of a state."""
         return sum(self.row_counts.values())
+
+    @cached_property
+    def state_bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bound (rows,) of every number of a state; finite."""
+        largest = min(element.max_effective_closure for element in self.elements)
+        displacement = largest / self.closure_per_displacement
+        bounds = {"delta": (-displacement, displacement)}
+        for element in self.elements:
+            bounds |= element.row_bounds
+        of_rows = [
+            bounds.get(name, (-LARGEST_FLOAT, LARGEST_FLOAT))
+            for name, count in self.row_counts.items()
+            for _ in range(count)
+        ]
+        lower, upper = np.clip(of_rows, -LARGEST_FLOAT, LARGEST_FLOAT).T.copy()
+        return lower, upper
 
     @property
     def asperities(self) -> FacetTables | None:

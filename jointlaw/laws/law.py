@@ -22,11 +22,12 @@ from ..discretisation.tables import VERSION
 from ..joints.batch import JointBatch, stable_time_step
 from ..joints.joint import Joint
 from ..joints.preload import preload
+from ..kernels.admissible import require_admissible_states
 from ..kernels.engine import Step, engine
 from ..kernels.reference import LawTables
 from ..parameters import keys, toml
 from ..parameters.declared import fingerprint, parameters_of
-from ..support.checks import Array, booleans, finite, more_than
+from ..support.checks import Array, booleans, finite, more_than, numbers
 from ..support.files import replace_file
 
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
@@ -105,9 +106,10 @@ class Law:
         Returns the new states, F in Pa (n, dim) or (dim,), and C in Pa/m (n, dim, dim) or
         (dim, dim), None without `tangent`; the arguments do not change. The algorithm and its
         equations: `jointlaw.kernels.reference.step`; it runs compiled, on all threads. Raises
-        ValueError for a wrong shape, a number that is not finite, or a step whose forces overflow.
+        ValueError for a wrong shape, a number that is not finite, a state with a number beyond its
+        bounds (`jointlaw.kernels.admissible`), or a step whose forces overflow.
         """
-        old = finite("states", states, "numbers of state")
+        old = numbers("states", states, "numbers of state")
         increment = finite("d", d, "m")
         rows = self.state_size
         dim = self.dim
@@ -119,6 +121,7 @@ class Law:
             )
         old = old.reshape(-1, rows)
         increment = np.ascontiguousarray(increment).reshape(-1, dim)
+        require_admissible_states(self.tables, old)
         size = np.abs(old[:, :dim]).max(axis=1) + np.abs(increment).max(axis=1)
         overflows = ~(self.tables.closure_per_displacement * size <= self.max_effective_closure)
         if overflows.any():

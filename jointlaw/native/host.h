@@ -311,7 +311,7 @@ static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
   for (; i + 4 <= n; i += 4)
     for (int l = 0; l < 4; l++) sum[l] += q[i + l] * q[i + l];
   for (; i < n; i++) sum[0] += q[i] * q[i];
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]) < JLAW_MAX_SLIDER_SQUARES;
 }
 
 /* Whether energies, plastic indentations, degradation and damage of a state are valid for this law */
@@ -372,9 +372,11 @@ static JLAW_FUNCTION int jlaw_step_is_valid_(const jlaw_law *law, const double *
 {
   double distance = 0.0, step_size = 0.0; /* NaN propagates through sums */
   for (int i = 0; i < law->dim; i++) distance += fabs(s[i]), step_size += fabs(d[i]);
-  *state_is_invalid = !(distance <= DBL_MAX) || !jlaw_state_is_valid_(law, s);
+  const double bound = law->closure_per_displacement;
+  *state_is_invalid =
+      !(bound * distance <= law->max_effective_closure) || !jlaw_state_is_valid_(law, s);
   return !*state_is_invalid
-         && law->closure_per_displacement * (distance + step_size) <= law->max_effective_closure;
+         && bound * (distance + step_size) <= law->max_effective_closure;
 }
 
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,

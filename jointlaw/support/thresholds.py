@@ -17,4 +17,5 @@ SEPARATED_STATE = 2.0  # state w of a Coulomb joint after separation: friction o
 MAX_STRENGTH = 1e70  # Pa: fourth powers of larger stresses of Coulomb's joint overflow
 FACTOR_CONVERGENCE = 4e-16  # relative change at which the search for slopes by stress ends
 MAX_FACTOR_ITERATIONS = 100  # of this search, which takes two to six for elastic asperities
+MAX_SLIDER_SQUARES = 1e300  # sum over the sliders of a state: larger squares overflow in a step
 MAX_OFFSET_CURVATURE = 0.8587  # largest |d2o/dp2| mating lengths, at p = 1/2 of one: 1.5/1.25^2.5

@@ -176,6 +176,7 @@ def test_a_state_of_version_1_is_read():
         lambda path: np.savez(path, version=99, fingerprint="a", values=np.zeros(3)),
         lambda path: np.savez(path, version=1, fingerprint="a", values=np.zeros(3)),
         lambda path: np.savez(path, version=1, fingerprint="a", values="text"),
+        lambda path: np.savez(path, version=1, fingerprint="a", values=np.full((3, 1), np.nan)),
         lambda path: path.mkdir(),
     ],
 )
@@ -312,7 +313,7 @@ NO_INDEX = [
             lambda batch: batch.restore(
                 replace(batch.snapshot(), values=np.nan * batch.snapshot().values)
             ),
-            "damaged",
+            r"delta\[0\] .* is nan, out of bounds",
         ),
     ],
 )

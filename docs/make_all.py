@@ -142,6 +142,7 @@ PARTS = {
     ),
     "native": Part("docs/measure/native.py updates", page="native.md", is_timed=True),
     "batch-size": Part("docs/measure/native.py batch-size", page="native.md", is_timed=True),
+    "joint-lists": Part("docs/measure/native.py joint-lists", page="native.md", is_timed=True),
     "graphics": Part(
         "docs/measure/native.py graphics FOLDER",
         quoted_in="native.md",

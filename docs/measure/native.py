@@ -2,6 +2,7 @@
 
 python docs/measure/native.py updates [--cc clang] [--rounds 60]
 python docs/measure/native.py batch-size [--rounds 60]
+python docs/measure/native.py joint-lists [--rounds 60]
 python docs/measure/native.py graphics FOLDER [--preset westerly-rough] [--joints 1000000]
 """
 
@@ -181,6 +182,55 @@ def batch_size(rounds=60):
     print_table(["joints", *head], rows)
 
 
+def joint_lists(rounds=60):
+    """Nanoseconds per listed joint of an update with `where`, at "balanced" in space.
+
+    Traction alone, without the dissipated energy, in processor time of one thread; the shortest of
+    many rounds taken in turn. Each figure is followed by its ratio to the whole batch in
+    parentheses. Two minutes.
+    """
+    law = replace(jl.presets.load("westerly-smooth"), resolution="balanced", plane=None)
+    rng = np.random.default_rng(1)
+    rows = []
+    for n in (300, 2000, 20_000, 100_000, 1_000_000):
+        batch = law.joints(n, track_dissipation=False)
+        increment = rng.normal(0.0, 2e-8, (n, law.dim))
+        batch.update(increment + 1e-6 * np.eye(law.dim)[0], tangent=False)
+        permutation = rng.permutation(n)
+        lists = {
+            "all, no `where`": None,
+            "all, in order": np.arange(n),
+            "1 in 50 left out": np.sort(permutation[n // 50 :]),
+            "all, any order": permutation,
+            "half, in order": np.sort(permutation[: n // 2]),
+            "half, any order": permutation[: n // 2],
+            "1 in 8, in order": np.sort(permutation[: n // 8]),
+        }
+        cases = {
+            name: partial(list_time, batch, cycle(listed_steps(increment, where)), where)
+            for name, where in lists.items()
+        }
+        times = shortest_times(cases, max(rounds * 5000 // n, 8))
+        whole, *others = times.values()
+        rows.append([n, f"{whole:.0f}", *(f"{ns:.0f} ({ns / whole:.2f})" for ns in others)])
+    print_table(["joints", *lists], rows)
+
+
+def listed_steps(increment, where):
+    """Increments of the listed joints, forward and back."""
+    listed = increment if where is None else increment[where]
+    return listed, -listed
+
+
+def list_time(batch, steps, where):
+    """Nanoseconds per listed joint of one update on one thread."""
+    os.environ["JOINTLAW_THREADS"] = "1"
+    d = next(steps)
+    start = time.thread_time()
+    batch.update(d, where=where, tangent=False)
+    return 1e9 * (time.thread_time() - start) / len(d)
+
+
 def graphics(folder: Path, preset="westerly-rough", joints=1_000_000):
     """The kernel of docs/native.md on a GPU, compared with the law in Python.
 
@@ -223,4 +273,4 @@ def graphics(folder: Path, preset="westerly-rough", joints=1_000_000):
 
 
 if __name__ == "__main__":
-    run_command(__doc__, updates, batch_size, graphics)
+    run_command(__doc__, updates, batch_size, joint_lists, graphics)

@@ -18,7 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..kernels.admissible import require_admissible_states
 from ..kernels.element import Measures
-from ..kernels.engine import JOINTS_PER_BLOCK, Step, allocate_blocks, block_index, engine
+from ..kernels.engine import (
+    JOINTS_PER_BLOCK,
+    Step,
+    allocate_blocks,
+    block_index,
+    engine,
+    is_increasing,
+)
 from ..support.checks import Array, finite, integer, numbers
 from .state import JointState, NonFiniteError
 
@@ -319,14 +326,15 @@ class JointBatch:
             return np.empty(0, np.intp)
         if index.ndim != 1 or not np.issubdtype(index.dtype, np.integer):
             raise ValueError("where must be a one-dimensional array of joint numbers or a mask")
-        lowest = int(index.min())
-        highest = int(index.max())
+        increases = is_increasing(index)  # such a list names no joint twice
+        lowest = int(index[0] if increases else index.min())
+        highest = int(index[-1] if increases else index.max())
         if lowest < 0 or highest >= self._n:
             invalid = lowest if lowest < 0 else highest
             raise ValueError(f"where names joint {invalid}; joints are 0 to {self._n - 1}")
-        if len(index) > 1 and np.bincount(index, minlength=1).max() > 1:
+        if not increases and np.bincount(index).max() > 1:
             raise ValueError("where names a joint twice; each joint takes one increment per step")
-        return index.astype(np.intp)
+        return np.ascontiguousarray(index, np.intp)
 
     def _closure_bound_after(self, step: Step) -> float:
         """Upper bound (m) of |y| over all joints and facets after a step.

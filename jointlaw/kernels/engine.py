@@ -61,6 +61,11 @@ def block_index(state: Array, joints: Index, rows: Any = slice(None)) -> tuple[I
     return block, rows, lane
 
 
+def is_increasing(joints: Index) -> bool:
+    """Whether each of these joint numbers is larger than the one before."""
+    return bool((joints[1:] > joints[:-1]).all())
+
+
 class Step:
     """Arrays of a step of m joints of one batch. It may be repeated with new increments in d.
 
@@ -91,11 +96,11 @@ class Step:
         self.measures = measures
         self.where = where
         self.commit = commit
-        # the states of the last call and the call, for `NativeEngine`
-        self.call: tuple[Array | None, Any] = None, None
+        # the states of the last call, the call, and the arrays that it refers to: `NativeEngine`
+        self.call: tuple[Array | None, Any, Any] = None, None, None
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"call": (None, None)}  # a call holds addresses
+        return self.__dict__ | {"call": (None, None, None)}  # a call holds addresses
 
 
 def engine(tables: LawTables) -> "NumpyEngine | NativeEngine":
@@ -191,6 +196,7 @@ class NativeEngine:
             )
         self._sliders = tables.sliders
         self._library_run = loaded.jlaw_run
+        self._library_sort = loaded.jlaw_sort_by_block
         self.lanes = library.vector_lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets; with plastic indentation,
         # Phi and Phi' at the indentation too
@@ -199,11 +205,11 @@ class NativeEngine:
 
     def advance(self, state: Array, step: Step, track_dissipation: bool) -> None:
         """Advance joints by a step; without `track_dissipation` it stays as it is in the state."""
-        state_of_call, call = step.call
+        state_of_call, call, _ = step.call
         if state_of_call is not state:
-            arrays = step.d, step.F, step.C, step.measures, step.where
+            arrays = step.d, step.F, step.C, step.measures, *self._sort_by_block(state, step.where)
             call = self._prepare_call(state, len(step.d), *map(address, arrays))
-            step.call = state, call
+            step.call = state, call, arrays
         call.track_dissipation = track_dissipation
         call.commit = step.commit
         self._run(library.ADVANCE, call)
@@ -223,10 +229,30 @@ class NativeEngine:
         self._run(operation, self._prepare_call(state, n, None, address(out)))
         return out
 
+    def _sort_by_block(
+        self, state: Array, where: Index | None
+    ) -> tuple[Index | None, Index | None]:
+        """The joints `where` sorted by block, and their places in `where`, None if sorted."""
+        if where is None:
+            return None, None
+        blocks, _, lanes = state.shape
+        if lanes == 1 or is_increasing(where):
+            return where, None
+        if len(where) < blocks // JOINTS_PER_BLOCK:  # the library counts the joints of every block
+            order = np.argsort(where)
+            return where[order], order
+        counts = np.zeros(blocks + 1, np.int64)
+        joints = np.empty_like(where)
+        places = np.empty_like(where)
+        self._library_sort(
+            address(where), len(where), address(counts), blocks, address(joints), address(places)
+        )
+        return joints, places
+
     def _prepare_call(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
-        """A call for n joints; arrays: addresses of d, F, C, measures and the indices."""
+        """A call for n joints; arrays: addresses of d, F, C, measures, the joints, their order."""
         _, rows, lanes = state.shape
-        addresses = address(state), *arrays, *[None] * (5 - len(arrays))
+        addresses = address(state), *arrays, *[None] * (6 - len(arrays))
         return library.BatchCall(
             ctypes.addressof(self._law), *addresses, n, 0, n, rows, lanes == 1, self.lanes
         )

@@ -7,10 +7,12 @@
  * gather instructions except for the look-up in the first-loading curve. Branches that some lanes
  * need are taken by all lanes and masked.
  *
- * Three things follow from this layout. An index list (b->index) scatters joints over blocks: they
- * are copied into one block, advanced, and copied back. A trial step (b->commit = 0) advances a
- * copy of the block, so the states do not change. While a block is advanced the next one is
- * prefetched, which hides the latency of memory for batches larger than the cache.
+ * Three things follow from this layout. A list of joints (b->index) is sorted by block. A block with
+ * many listed joints is advanced as a whole, and the states of its other joints are restored.
+ * Where few joints of a block are listed, joints of several blocks are gathered into a copy,
+ * advanced, and copied back. A trial step (b->commit = 0) advances a copy of the block, so the
+ * states do not change. While a block is advanced the next one is prefetched, which hides the
+ * latency of memory for batches larger than the cache.
  *
  * A batch also keeps, in the rows after the state, Phi and Phi' of the first-loading curve of every
  * facet (and, if asperities yield, the same at the plastic indentation). The values at the end of a
@@ -42,14 +44,22 @@
 #define BLOCK JLAW_JOINTS_PER_BLOCK
 #endif
 
-/* Write measures of the first `count` joints at n after a step, one row of b->measures each */
+enum {
+  MAX_GATHERED_OF_BLOCK = 5, /* listed joints of a block up to which gathering them is faster */
+  NOT_LISTED = -1
+};
+
+/* Write measures after a step of the joints at n whose rows are listed, into these rows of
+ * b->measures */
 static void write_measures(const jlaw_batch *b, jl_states n, const jl_measures *measures,
-                           double *out, int count)
+                           const long *row)
 {
   const int dim = b->law->dim, row_size = JLAW_MEASURES + dim;
   const int element_row = jl_element_row(b->law);
-  for (int l = 0; l < count; l++, out += row_size) {
+  for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+    if (row[l] == NOT_LISTED) continue;
     const double *s = n.s + l;
+    double *out = b->measures + row[l] * row_size;
     out[JLAW_SLIDING] = JL_JOINT(measures->sliding, l);
     out[JLAW_SLIPPING] = JL_JOINT(measures->slipping, l);
     out[JLAW_SEPARATED] = JL_JOINT(measures->separated, l);
@@ -60,31 +70,33 @@ static void write_measures(const jlaw_batch *b, jl_states n, const jl_measures *
   }
 }
 
-/* Advance `count` joints of a block. `first`: index of the first one in d, F, C and measures;
- * next_offset: distance to the block that is advanced next, 0 if there is none */
-static void advance_block(const jlaw_batch *b, double *block, size_t next_offset, long first,
-                          int count)
+/* Advance the joints of a block. row: row of each joint in d, F, C and measures; a joint without
+ * one takes a zero increment. next_offset: distance to the block that is advanced next, 0 if there
+ * is none */
+static void advance_block(const jlaw_batch *b, double *block, size_t next_offset, const long *row)
 {
   const int dim = b->law->dim, curve_stored = b->rows > jl_state_rows(b->law);
-  const double *d = b->d + first * dim;
-  double *F = b->F + first * dim, *C = b->C ? b->C + first * dim * dim : NULL;
-  for (int at = 0; at < count; at += JL_JOINTS_PER_PASS) {
+  for (int at = 0; at < BLOCK; at += JL_JOINTS_PER_PASS, row += JL_JOINTS_PER_PASS) {
     const jl_states n = {block + at, BLOCK, next_offset};
     jl_joint_real p[3], f[3], c[9];
-    const int lanes = count - at < JL_JOINTS_PER_PASS ? count - at : JL_JOINTS_PER_PASS;
-    for (int i = 0; i < dim; i++) {
-      p[i] = jl_broadcast_joint(0.0);
-      for (int l = 0; l < lanes; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
+    for (int i = 0; i < dim; i++) p[i] = jl_broadcast_joint(0.0);
+    int is_empty = 1;
+    for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+      if (row[l] == NOT_LISTED) continue;
+      is_empty = 0;
+      for (int i = 0; i < dim; i++) JL_JOINT(p[i], l) = b->d[row[l] * dim + i];
     }
+    if (is_empty) continue;
     jl_measures measures;
-    jl_step_of_kind(b->law, n, p, f, c, b->track_dissipation, C != NULL, curve_stored,
-                    b->measures && !C ? &measures : NULL);
-    if (b->measures && C) measures = jl_measure(b->law, n);
-    if (b->measures)
-      write_measures(b, n, &measures, b->measures + (first + at) * (JLAW_MEASURES + dim), lanes);
-    for (int l = 0; l < lanes; l++) {
-      for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JL_JOINT(f[i], l);
-      for (int i = 0; C && i < dim * dim; i++) C[(at + l) * dim * dim + i] = JL_JOINT(c[i], l);
+    jl_step_of_kind(b->law, n, p, f, c, b->track_dissipation, b->C != NULL, curve_stored,
+                    b->measures && !b->C ? &measures : NULL);
+    if (b->measures && b->C) measures = jl_measure(b->law, n);
+    if (b->measures) write_measures(b, n, &measures, row);
+    for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+      if (row[l] == NOT_LISTED) continue;
+      double *F = b->F + row[l] * dim, *C = b->C + row[l] * dim * dim;
+      for (int i = 0; i < dim; i++) F[i] = JL_JOINT(f[i], l);
+      for (int i = 0; b->C && i < dim * dim; i++) C[i] = JL_JOINT(c[i], l);
     }
   }
 }
@@ -95,36 +107,145 @@ static double *state_of(const jlaw_batch *b, long long joint)
   return b->state + joint / BLOCK * BLOCK * b->rows + joint % BLOCK;
 }
 
-/* Advance entries first to last - 1 of b->index, or of all joints if it is NULL; `first` is a
- * multiple of BLOCK. Without b->commit no state changes. Returns 0, or -1
- * if no memory is left. */
-static int advance(const jlaw_batch *b, long first, long last)
+/* Advance joints first to last - 1; `first` is a multiple of BLOCK. Without b->commit no state changes.
+ * Returns 0, or -1 if no memory is left. */
+static int advance_all(const jlaw_batch *b, long first, long last)
 {
   const size_t rows = (size_t) b->rows, size = rows * BLOCK;
   double *copy = NULL;
-  if (b->index || !b->commit) {
+  if (!b->commit) {
     copy = (double *) calloc(size, sizeof *copy);
     if (!copy) return -1;
   }
   for (long start = first; start < last; start += BLOCK) {
     const int count = last - start < BLOCK ? (int) (last - start) : BLOCK;
-    double *block = copy;
-    if (b->index)
-      for (int l = 0; l < count; l++) {
-        const double *from = state_of(b, b->index[start + l]);
-        for (size_t r = 0; r < rows; r++) copy[r * BLOCK + (size_t) l] = from[r * BLOCK];
-      }
-    else if (!b->commit) memcpy(copy, state_of(b, start), size * sizeof *copy);
-    else block = state_of(b, start);
-    advance_block(b, block, copy ? 0 : size, start, count);
-    if (b->index && b->commit)
-      for (int l = 0; l < count; l++) {
-        double *to = state_of(b, b->index[start + l]);
-        for (size_t r = 0; r < rows; r++) to[r * BLOCK] = copy[r * BLOCK + (size_t) l];
-      }
+    double *block = state_of(b, start);
+    if (copy) block = (double *) memcpy(copy, block, size * sizeof *copy);
+    long row[BLOCK];
+    for (int l = 0; l < BLOCK; l++) row[l] = l < count ? start + l : NOT_LISTED;
+    advance_block(b, block, copy ? 0 : size, row);
   }
   free(copy);
   return 0;
+}
+
+typedef struct { /* listed joints in the lanes of a block of states */
+  int count;
+  long long joint[BLOCK];
+  long row[BLOCK]; /* of d, F, C and measures, or NOT_LISTED */
+} joint_group;
+
+static joint_group empty_group(void)
+{
+  joint_group g = {0};
+  for (int l = 0; l < BLOCK; l++) g.row[l] = NOT_LISTED;
+  return g;
+}
+
+/* Add entry k of the list to lane l of a group */
+static void add_entry(const jlaw_batch *b, joint_group *g, int l, long k)
+{
+  g->joint[l] = b->index[k];
+  g->row[l] = b->order ? (long) b->order[k] : k;
+  g->count++;
+}
+
+/* Advance a group in its own block. next_offset: distance to the block that is advanced next. copy:
+ * memory for a block. */
+static void advance_in_place(const jlaw_batch *b, const joint_group *g, double *block,
+                             size_t next_offset, double *copy)
+{
+  const size_t rows = (size_t) b->rows;
+  if (!b->commit) {
+    advance_block(b, (double *) memcpy(copy, block, rows * BLOCK * sizeof *copy), 0, g->row);
+    return;
+  }
+  double *saved = copy;
+  for (int l = 0; l < BLOCK; l++)
+    for (size_t r = 0; g->row[l] == NOT_LISTED && r < rows; r++)
+      *saved++ = block[r * BLOCK + (size_t) l];
+  advance_block(b, block, next_offset, g->row);
+  saved = copy;
+  for (int l = 0; l < BLOCK; l++)
+    for (size_t r = 0; g->row[l] == NOT_LISTED && r < rows; r++)
+      block[r * BLOCK + (size_t) l] = *saved++;
+}
+
+/* Advance gathered joints in `copy`, return them to their blocks, and empty the group */
+static void advance_gathered(const jlaw_batch *b, joint_group *gathered, double *copy)
+{
+  advance_block(b, copy, 0, gathered->row);
+  for (int l = 0; b->commit && l < gathered->count; l++) {
+    double *to = state_of(b, gathered->joint[l]);
+    for (size_t r = 0; r < (size_t) b->rows; r++) to[r * BLOCK] = copy[r * BLOCK + (size_t) l];
+  }
+  *gathered = empty_group();
+}
+
+/* Add the joints of a group to the joints that were gathered from other blocks into `copy` */
+static void gather(const jlaw_batch *b, const joint_group *g, joint_group *gathered, double *copy)
+{
+  for (int l = 0; l < BLOCK; l++) {
+    if (g->row[l] == NOT_LISTED) continue;
+    if (gathered->count == BLOCK) advance_gathered(b, gathered, copy);
+    const int to = gathered->count++;
+    gathered->joint[to] = g->joint[l];
+    gathered->row[to] = g->row[l];
+    const double *from = state_of(b, g->joint[l]);
+    for (size_t r = 0; r < (size_t) b->rows; r++) copy[r * BLOCK + (size_t) to] = from[r * BLOCK];
+  }
+}
+
+/* Prefetch the rows of the entries from `start` on, which a list in any order scatters */
+static void prefetch_rows(const jlaw_batch *b, long start)
+{
+  const int dim = b->law->dim;
+  for (long k = start; b->order && k < b->n && k < start + BLOCK; k++) {
+    const long row = (long) b->order[k];
+    __builtin_prefetch(b->d + row * dim);
+    __builtin_prefetch(b->F + row * dim, 1);
+    if (b->C) __builtin_prefetch(b->C + row * dim * dim, 1);
+  }
+}
+
+static void prefetch_block(const jlaw_batch *b, const double *block)
+{
+  for (int r = 0; r < b->rows; r++) __builtin_prefetch(block + (size_t) r * BLOCK, 1);
+}
+
+/* Advance entries first to last - 1 of b->index. A block of joints belongs to the thread that takes
+ * its first entry. Returns 0, or -1 if no memory is left. */
+static int advance_listed(const jlaw_batch *b, long first, long last)
+{
+  const size_t rows = (size_t) b->rows, size = rows * BLOCK;
+  const long long *index = b->index;
+  double *copy = (double *) calloc(2 * size, sizeof *copy);
+  if (!copy) return -1;
+  joint_group gathered = empty_group();
+  while (first > 0 && first < last && index[first] / BLOCK == index[first - 1] / BLOCK) first++;
+  for (long start = first; start < last;) {
+    const long long block = index[start] / BLOCK;
+    joint_group group = empty_group();
+    for (; start < b->n && index[start] / BLOCK == block; start++)
+      add_entry(b, &group, (int) (index[start] % BLOCK), start);
+    prefetch_rows(b, start);
+    if (group.count == BLOCK || group.count > MAX_GATHERED_OF_BLOCK) {
+      const long long next = start < last ? index[start] / BLOCK - block : 0;
+      advance_in_place(b, &group, state_of(b, block * BLOCK), (size_t) next * size, copy);
+    } else {
+      if (start < last) prefetch_block(b, state_of(b, index[start] / BLOCK * BLOCK));
+      gather(b, &group, &gathered, copy + size);
+    }
+  }
+  advance_gathered(b, &gathered, copy + size);
+  free(copy);
+  return 0;
+}
+
+/* Advance joints, or entries of b->index, first to last - 1 */
+static int advance(const jlaw_batch *b, long first, long last)
+{
+  return b->index ? advance_listed(b, first, last) : advance_all(b, first, last);
 }
 
 /* Measures (n, 5) of joints first to last - 1, in the order of kernels/element.py, into b->F */

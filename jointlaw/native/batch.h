@@ -28,7 +28,8 @@ typedef struct {
   const double *d;        /* (n, dim) */
   double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
   double *measures;       /* (n, JLAW_MEASURES + dim) after the step, or NULL */
-  const long long *index; /* (n,): the joints to advance; NULL: all */
+  const long long *index; /* (n,): the joints to advance, sorted by block, with d; NULL: all */
+  const long long *order; /* (n,): their rows in d, F, C and measures; NULL: 0, 1, 2 ... */
   long long n;
   long long next,
       chunk; /* first joint that no thread has taken, 0 before a call; joints per grab */

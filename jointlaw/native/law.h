@@ -686,8 +686,10 @@ JL_INLINE void jl_map_to_friction_limit(const double *f, const jl_facet_step *o,
   }
   const jl_real factor = /* squares of smaller forces underflow: the force counts as zero */
       jl_select_or_zero(c->trial2 > JLAW_MIN_DIVISOR, c->return_factor);
-  *qs = factor * c->ts;
-  *qt = factor * c->tt;
+  /* 0.0 makes a negative zero positive: a cell that no lane loads is skipped, so the sign of a zero
+   * would depend on the joints in the other lanes */
+  *qs = factor * c->ts + 0.0;
+  *qt = factor * c->tt + 0.0;
 }
 
 /* Energy that slip of the sliders, and springs that disengage under shear, dissipate; every term is

@@ -45,5 +45,20 @@ OUT int jlaw_run(jlaw_batch *b, int operation)
 /* Rows of a state, which Python compares with its own number */
 OUT int jlaw_state_rows(const jlaw_law *law) { return jl_state_rows(law); }
 
+/* Sort joints (n,) by their blocks. Each block starts at the number of joints in the blocks before
+ * it, which counts (blocks + 1,), zeros before the call, accumulates. Writes the sorted joints into
+ * index (n,) and their places in the list into order (n,). */
+OUT void jlaw_sort_by_block(const long long *joints, long long n, long long *counts,
+                            long long blocks, long long *index, long long *order)
+{
+  for (long long k = 0; k < n; k++) counts[joints[k] / JLAW_JOINTS_PER_BLOCK + 1]++;
+  for (long long i = 0; i < blocks; i++) counts[i + 1] += counts[i];
+  for (long long k = 0; k < n; k++) {
+    const long long place = counts[joints[k] / JLAW_JOINTS_PER_BLOCK]++;
+    index[place] = joints[k];
+    order[place] = k;
+  }
+}
+
 /* Hash of the sources that this library was built from */
 OUT const char *jlaw_sources(void) { return JLAW_SOURCES; }

@@ -22,7 +22,10 @@ class BatchCall(ctypes.Structure):
     """`jlaw_batch` of batch.h."""
 
     _fields_ = [
-        *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "measures", "index")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("law", "state", "d", "F", "C", "measures", "index", "order")
+        ),
         *((name, ctypes.c_longlong) for name in ("n", "next", "chunk")),
         *(
             (name, ctypes.c_int)
@@ -72,6 +75,10 @@ def load_file(path: Path) -> ctypes.CDLL:
             f"{REBUILD_HINT}; `JOINTLAW_LEVELS=all python -m jointlaw.native` builds for mixed "
             "machines"
         )
+    pointer = ctypes.c_void_p
+    count = ctypes.c_longlong
+    library.jlaw_sort_by_block.argtypes = [pointer, count, pointer, count, pointer, pointer]
+    library.jlaw_sort_by_block.restype = None
     return library
 
 

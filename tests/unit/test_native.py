@@ -4,6 +4,7 @@ made, found and refused."""
 import threading
 from types import SimpleNamespace
 
+import kinds
 import numpy as np
 import pytest
 from c_host import random_law, random_path
@@ -323,3 +324,77 @@ def test_a_compiler_that_is_there_may_be_a_stub(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     assert len(build.compilers_on_path()) == 4
     assert not any(map(build.works, build.compilers_on_path()))
+
+
+LISTS = {  # of joints of a batch of N, from whole blocks to a single joint
+    "all": np.arange(N),
+    "few left out": np.delete(np.arange(N), [0, 13, 64, 100, N - 1]),
+    "permutation": np.random.default_rng(1).permutation(N),
+    "half": np.sort(np.random.default_rng(2).permutation(N)[: N // 2]),
+    "half, any order": np.random.default_rng(3).permutation(N)[: N // 2],
+    "one of a block": np.arange(N - 2, 0, -9),
+    "one": np.array([N - 1]),
+    "six of a block": np.array([29, 24, 31, 26, 30, 25]),
+}
+
+
+@pytest.mark.parametrize("listed", LISTS)
+@pytest.mark.parametrize("threads", ["1", "3"])
+@pytest.mark.parametrize("law_name", kinds.LAWS)
+def test_listed_joints_get_the_bits_of_a_whole_step_and_others_keep_theirs(
+    monkeypatch, law_name, threads, listed
+):
+    monkeypatch.setattr(engine, "MIN_SLIDERS_FOR_THREADS", 0)
+    monkeypatch.setenv("JOINTLAW_THREADS", threads)
+    law = kinds.LAWS[law_name]
+    list_of_joints = LISTS[listed]
+    is_listed = np.isin(np.arange(N), list_of_joints)
+    d, d_next, *before = path(law, len(law_name), 6)[::-1]
+    whole, by_list, untouched = (law.joints(N) for _ in range(3))
+    for batch in whole, by_list, untouched:
+        for increments in before[::-1]:
+            batch.update(increments)
+    for take_step in "trial", "update":
+        F, C = getattr(whole, take_step)(d)
+        F_listed, C_listed = getattr(by_list, take_step)(d[list_of_joints], where=list_of_joints)
+        assert F_listed.tobytes() == F[list_of_joints].tobytes()
+        assert C_listed.tobytes() == C[list_of_joints].tobytes()
+        if take_step == "trial":
+            states = by_list.snapshot().values
+            assert states.tobytes() == untouched.snapshot().values.tobytes()
+    expected_states = np.where(
+        is_listed[:, None], whole.snapshot().values, untouched.snapshot().values
+    )
+    assert by_list.snapshot().values.tobytes() == expected_states.tobytes()
+    # the numbers that a batch keeps beside the states are right, too
+    expected = np.where(is_listed[:, None], whole.update(d_next)[0], untouched.update(d_next)[0])
+    assert by_list.update(d_next)[0].tobytes() == expected.tobytes()
+
+
+def test_measures_of_a_list_are_in_its_order(make_law):
+    law = make_law()
+    whole = law.joints(N, track_dissipation=False)
+    by_list = law.joints(N, track_dissipation=False)
+    d = np.ascontiguousarray(path(law, 2, 6)[0])
+    shown = np.empty((N, 6 + law.dim))
+    whole.advance(engine.Step(d, np.empty_like(d), None, measures=shown))
+    for joints in LISTS.values():
+        m = len(joints)
+        by_list.reset()
+        step = engine.Step(
+            d[joints], np.empty((m, law.dim)), None, joints, measures=np.empty((m, 6 + law.dim))
+        )
+        by_list.advance(step)
+        assert step.measures.tobytes() == shown[joints].tobytes()
+        by_list.reset()
+        step.measures[:] = 0.0
+        by_list.advance(step)  # repeated, with the list as it was sorted
+        assert step.measures.tobytes() == shown[joints].tobytes()
+
+
+@pytest.mark.parametrize("joints", [[3, 3], [5, 4, 3, 4], [*range(20), 7]])
+def test_a_list_that_names_a_joint_twice_is_refused(law, joints):
+    batch = law.joints(N)
+    with pytest.raises(ValueError, match="where names a joint twice"):
+        batch.update(np.full((len(joints), law.dim), 1e-8), where=joints)
+    assert not batch.snapshot().values.any()

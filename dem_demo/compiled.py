@@ -24,8 +24,9 @@ POINTER = ctypes.c_void_p
 FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "locate_contacts": ([], None),
     "next_contacts": ([POINTER] * 2, None),
-    "update_contacts": ([], None),
+    "update_contacts": ([], INTEGER),
     "find_candidates": ([INTEGER, *[POINTER] * 4, INTEGER, *[POINTER] * 4], INTEGER),
+    "compute_rates": ([], None),
     "set_increments": ([DOUBLE], None),
     "move_blocks": ([DOUBLE], None),
     "read_joints": ([], None),
@@ -78,6 +79,12 @@ class StepArrays(Arrays):
     _fields_ = [(name, field.ctype) for name, field in layout.STEP.items()]
 
 
+class CornerArrays(Arrays):
+    """`dem_corners` of layout.h: outlines of the blocks, and contacts of corners on edges."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.CORNERS.items()]
+
+
 class RelaxationArrays(Arrays):
     """`dem_relaxation` of layout.h: numbers of a relaxation, and addresses of its arrays."""
 
@@ -106,6 +113,11 @@ class RelaxedBolts(Arrays):
     """`dem_relaxed_bolts` of layout.h: rock bolts in a relaxation."""
 
     _fields_ = [(name, field.ctype) for name, field in layout.RELAXED_BOLTS.items()]
+
+
+def function_address(name: str) -> int:
+    """Return the address of the function `dem_NAME`, for a structure that holds it."""
+    return ctypes.cast(getattr(library(), f"dem_{name}"), ctypes.c_void_p).value or 0
 
 
 def address(array: Any) -> int:

@@ -1,4 +1,4 @@
-"""Geometry of contacts: closure, sliding and length of joint at corners on edges.
+"""Geometry of contacts in the plane: the rows of corners on edges.
 
 A contact is one corner over the line of one edge of another block. It is the simplest element that
 keeps work and force consistent: its closure is the depth of the corner below the line, and closure,
@@ -15,13 +15,13 @@ The length of joint that a contact stands for therefore depends on how the corne
 
 Any change of this length changes the stored energy of the contact. Minus the stored energy per
 length times the derivative of the length is hence a force, which acts on the two blocks
-(`length_gradient`, `length_per_rotation`). Without it, rocking blocks would gain or lose energy.
+(`area_gradient`). Without it, rocking blocks would gain or lose energy.
 
 A corner belongs to an edge only within a range, outside of which a neighbouring corner or edge is
 in the same place (see `manager.py`). The margin to either end of the range is computed here with
 the rest, in one pass.
 
-The geometry is computed by `native/blocks.c`. Vectors are complex numbers x + iy here: conj(p) q
+The geometry is computed by `native/corners.c`. Vectors are complex numbers x + iy here: conj(p) q
 holds their dot product (real part) and cross product (imaginary part).
 """
 
@@ -29,9 +29,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compiled import StepArrays, address
+from ..compiled import CornerArrays, address
 from ..native.layout import CONSTANTS
 from ..scene import Block
+from .rows import ContactRows
 
 PARALLEL_SINE = CONSTANTS["PARALLEL_SINE"].value
 
@@ -45,14 +46,19 @@ class Outlines:
     1,): number of the first corner of each block, and c. corner_position, edge_direction (c,): at
     the present motion, written by the compiled step. corner_length (m): length of joint at a corner
     that stands on an edge; transition_length (m): distance over which one corner gives way to
-    another.
+    another. thickness (m): of the blocks.
     """
 
     def __init__(
-        self, blocks: Sequence[Block], corner_length: float, transition_length: float
+        self,
+        blocks: Sequence[Block],
+        corner_length: float,
+        transition_length: float,
+        thickness: float,
     ) -> None:
         self.corner_length = corner_length
         self.transition_length = transition_length
+        self.thickness = thickness
         sizes = np.array([len(block.corners) for block in blocks])
         self.first_corner = np.concatenate([[0], np.cumsum(sizes)])
         self.block = np.repeat(np.arange(len(blocks)), sizes)
@@ -66,16 +72,17 @@ class Outlines:
         self.corner_position = np.empty(len(edge), complex)
         self.edge_direction = np.empty(len(edge), complex)
 
-    def step_arrays(self, motion: np.ndarray, contacts: int = 0) -> StepArrays:
+    def corner_arrays(self, motion: np.ndarray, contacts: int = 0) -> CornerArrays:
         """Arguments of the compiled step with the geometry of these outlines bound to them.
 
         motion: (6, blocks), position, rotation and velocities of each block; contacts: how many
         contacts there are.
         """
-        arrays = StepArrays(
+        arrays = CornerArrays(
             n_blocks=len(self.first_corner) - 1,
             n_corners=len(self.block),
             n_contacts=contacts,
+            thickness=self.thickness,
             corner_length=self.corner_length,
             transition_length=self.transition_length,
         )
@@ -86,19 +93,17 @@ class Outlines:
         return arrays
 
 
-class Contacts:
+class Contacts(ContactRows):
     """k contacts of corners with edges, at a motion of the blocks; SI units, vectors complex.
 
-    corner, edge (k,): numbers in the outlines.
-    block_a, block_b (k,): their blocks, block_a < block_b.
+    The rows: closure is the depth of the corner below the line of the edge; the shear is the
+    displacement of block b relative to block a along the direction a quarter turn clockwise from
+    the normal.
+
+    corner, edge (k,): numbers in the outlines, the keys of a contact.
     position (k,): of the corner; normal (k,): unit vector from block a to block b.
-    closure (k,): depth of the corner below the line of the edge, positive when pressed together.
-    length (k,): of the joint that the contact stands for; previous_length (k,): the same before
-    corners went on to other edges in the last update.
-    length_gradient (k,), length_per_rotation (k,): derivatives of the length by displacement and by
-    rotation of b relative to a, at the contact.
-    opening_rate, sliding_rate (k,): velocity of b relative to a along the normal, and along the
-    direction a quarter turn clockwise from it.
+    length (k,): of the joint that the contact stands for, its area over the thickness;
+    previous_length (k,): the same before corners went on to other edges in the last update.
 
     Arrays (2, k) run over the two sides, the edges that meet at the corner. tilt_sine: sine of the
     angle between side and edge; overlap_length: length of joint where that side lies on the edge;
@@ -111,28 +116,27 @@ class Contacts:
     ) -> None:
         """Contacts of corners (k,) with edges (k,) at a motion (6, blocks)."""
         k = len(corner)
+        super().__init__(**vars(ContactRows.zeros(k, dim=2, dof=3, n_keys=2)))
         self.outlines = outlines
-        self.corner = np.array(corner, np.int64)
-        self.edge = np.array(edge, np.int64)
-        self.block_a = np.empty(k, np.int64)
-        self.block_b = np.empty(k, np.int64)
+        self.corner, self.edge = self.keys
+        self.corner[:] = corner
+        self.edge[:] = edge
         self.position = np.empty(k, complex)
         self.normal = np.empty(k, complex)
-        self.closure = np.empty(k)
         self.length = np.empty(k)
         self.previous_length = np.empty(k)
-        self.length_gradient = np.empty(k, complex)
-        self.length_per_rotation = np.empty(k)
-        self.opening_rate = np.empty(k)
-        self.sliding_rate = np.empty(k)
         self.tilt_sine = np.empty((2, k))
         self.overlap_length = np.empty((2, k))
         self.range_margin = np.empty((2, k))
         self.corner_takes_over = np.empty((2, k), bool)
-        own_arrays = {name: a for name, a in vars(self).items() if isinstance(a, np.ndarray)}
-        self.step_arrays = outlines.step_arrays(motion, k)
-        self.step_arrays.bind(**own_arrays, work_rows=np.empty(k, np.int64))
-        self.step_arrays.call("locate_contacts")
+        self.corner_arrays = outlines.corner_arrays(motion, k)
+        self.corner_arrays.bind(
+            self, "corner", "edge", "block_a", "block_b", "closure", "area", "kinematics",
+            "area_gradient", "position", "normal", "length", "previous_length", "tilt_sine",
+            "overlap_length", "range_margin", "corner_takes_over",
+            work_rows=np.empty(k, np.int64),
+        )  # fmt: skip
+        self.corner_arrays.call("locate_contacts")
 
     @property
     def codes(self) -> np.ndarray:
@@ -158,24 +162,5 @@ class Contacts:
         """Codes (k,) of the contacts that come next at the nearer limits of the ranges."""
         corner = np.empty(len(self.corner), np.int64)
         edge = np.empty(len(self.corner), np.int64)
-        self.step_arrays.call("next_contacts", address(corner), address(edge))
+        self.corner_arrays.call("next_contacts", address(corner), address(edge))
         return corner * len(self.outlines.block) + edge
-
-    def assemble(self, motion: np.ndarray, push, shear, energy=0.0) -> np.ndarray:
-        """Forces and torques (blocks, 3) on the blocks at a motion (6, blocks), in N and N m.
-
-        push, shear (k,) in N: forces on block b along the normal and in the direction of sliding;
-        the opposite acts on block a at the same position. energy (k,) in J/m: stored energy per
-        length of joint.
-        """
-        force = (push - 1j * shear) * self.normal - energy * self.length_gradient
-        couple = energy * self.length_per_rotation
-        centroid = motion[0] + 1j * motion[1]
-        torque_on_a = ((self.position - centroid[self.block_a]).conj() * force).imag
-        torque_on_b = ((self.position - centroid[self.block_b]).conj() * force).imag
-        x = force.real
-        y = force.imag
-        parts = np.concatenate([-x, x, -y, y, couple - torque_on_a, torque_on_b - couple])
-        rows = np.concatenate([self.block_a, self.block_b])
-        place = (3 * rows + np.arange(3)[:, None]).ravel()
-        return np.bincount(place, parts, 3 * motion.shape[1]).reshape(-1, 3)

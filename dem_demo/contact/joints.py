@@ -35,7 +35,9 @@ def tabulate_unmated_loading(law: jl.Law) -> dict[str, np.ndarray]:
     """
     closure = tabulate_first_loading(law)["closure"]
     batch = law.joints(len(closure), mated=False)
-    batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
+    d = np.zeros((len(closure), law.dim))
+    d[:, 0] = closure
+    batch.update(d, tangent=False)
     return {"closure": closure, "work": batch.stored_energy}
 
 
@@ -62,13 +64,15 @@ def tabulate_first_loading(law: jl.Law) -> dict[str, np.ndarray]:
 class LawJoints:
     """The joints of one law, at their places in a pool.
 
-    pool: `jl.JointPool` of the law; curve: its first-loading curve, by columns.
-    step: one step of all places: d (places, 2) in m, F (places, 2) in Pa, and `shown`
-    (places, 6 + 2), measures and displacements. silent_step: the same without `shown`.
+    dim: components of a displacement, 2 or 3. pool: `jl.JointPool` of the law; curve: its
+    first-loading curve, by columns.
+    step: one step of all places: d (places, dim) in m, F (places, dim) in Pa, and `measures`
+    (places, 6 + dim), measures and displacements. silent_step: the same without `measures`.
     """
 
     def __init__(self, law: jl.Law, reduction: float) -> None:
         self.law = law
+        self.dim = law.dim
         self.curve = {**tabulate_first_loading(law)}
         self.curve["stiffness"] = law.first_loading_stiffness(self.curve["closure"], reduction)
         self.clear()
@@ -76,14 +80,14 @@ class LawJoints:
     def clear(self) -> None:
         """Start with an empty pool."""
         self.pool = jl.JointPool(self.law)
-        self._make_steps(np.zeros((0, 2)), np.zeros((0, len(MEASURES) + 2)))
+        self._make_steps(np.zeros((0, self.dim)), np.zeros((0, len(MEASURES) + self.dim)))
 
     def _make_steps(self, F: np.ndarray, shown: np.ndarray) -> None:
         """Arrays for all places of the pool, the first of them with this content."""
         places = len(self.pool.batch)
-        d = np.zeros((places, 2))
-        all_F = np.zeros((places, 2))
-        all_shown = np.zeros((places, len(MEASURES) + 2))
+        d = np.zeros((places, self.dim))
+        all_F = np.zeros((places, self.dim))
+        all_shown = np.zeros((places, len(MEASURES) + self.dim))
         all_F[: len(F)] = F
         all_shown[: len(shown)] = shown
         self.step = jl.Step(d, all_F, None, measures=all_shown)
@@ -109,9 +113,9 @@ class LawJoints:
         """Let joints start as new at their first touch.
 
         mated: whether the two faces fit each other; bonded: whether bonds are intact. Returns the
-        displacement (2,) of the law at first touch: closure and sliding (m).
+        displacement (dim,) of the law at first touch: closure and sliding (m).
         """
-        start = np.zeros(2) if mated else self.law.unmated_start
+        start = np.zeros(self.dim) if mated else self.law.unmated_start
         batch = self.pool.batch
         batch.reset(places, mated)
         if not bonded:
@@ -184,7 +188,8 @@ def stick_response(
 class Joints:
     """All joints of a scene; arrays run over the k contacts.
 
-    delta (k, 2) in m: closure and sliding since first touch; traction (k, 2) in Pa.
+    dim: components of a displacement of the laws, 2 in the plane and 3 in space.
+    delta (k, dim) in m: closure and sliding since first touch; traction (k, dim) in Pa.
     sliding, slipping, separated (k,): fractions of their shear capacity.
     stored_energy, dissipated_energy (k,) in J/m2; damage (k,): of bonds, 1 without tension.
     law, place (k,): number of the law, and place in its pool. by_law: the joints of each law.
@@ -193,17 +198,18 @@ class Joints:
     and multiplies the sliding at which it acts. Hence tan(friction angle), tan(dilation angle) and
     cohesion are divided by F, while the work is the work of the law, so no energy is created.
 
-    Faces that meet in a run are unmated if the law has a finite mating length. first_touch (k, 2):
-    displacement of the law (closure and sliding, m) at which such a joint first touches, zero for a
-    mated one. edge_pairs (k, 2): the two edges whose faces meet.
+    Faces that meet in a run are unmated if the law has a finite mating length. first_touch
+    (k, dim): displacement of the law (closure and sliding, m) at which such a joint first touches,
+    zero for a mated one. edge_pairs (k, 2): the two edges whose faces meet.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.reduction = np.array([1.0, scene.reduction])
         self.law_names = [*scene.laws]
         self.by_law = [LawJoints(law, scene.reduction) for law in scene.laws.values()]
+        self.dim = self.by_law[0].dim
+        self.reduction = np.array([1.0, *[scene.reduction] * (self.dim - 1)])
         self.tensile_stiffness = np.array([law.tensile_stiffness for law in scene.laws.values()])
-        self.first_touch = np.zeros((0, 2))
+        self.first_touch = np.zeros((0, self.dim))
         self.edge_pairs = np.zeros((0, 2), int)
         self._arrange(np.zeros(0, int), np.zeros(0, int))
 
@@ -213,8 +219,8 @@ class Joints:
         self.law = law.astype(np.int64)
         self.place = place.astype(np.int64)
         self.rows_by_law = [np.flatnonzero(law == i) for i in range(len(self.by_law))]
-        self.traction = np.zeros((self.n, 2))
-        self.delta = np.zeros((self.n, 2))
+        self.traction = np.zeros((self.n, self.dim))
+        self.delta = np.zeros((self.n, self.dim))
         self.measures = np.zeros((len(MEASURES), self.n))
         (
             self.sliding,
@@ -226,7 +232,7 @@ class Joints:
         ) = self.measures  # in the order of MEASURES
         arrays = [joints.arrays() for joints in self.by_law]
         self._law_arrays = (LawJointArrays * len(arrays))(*arrays)
-        self.step_arrays = StepArrays(n_contacts=self.n)
+        self.step_arrays = StepArrays(n_contacts=self.n, dim=self.dim)
         self.bind(self.step_arrays)
         self.step_arrays.call("read_joints")
 
@@ -251,7 +257,7 @@ class Joints:
         new_rows = np.flatnonzero(is_new)
         has_ended = ~np.isin(np.arange(self.n), old_row)
         place = np.append(self.place, -1)[old_row]
-        first_touch = np.vstack([self.first_touch, [0.0, 0.0]])[old_row]
+        first_touch = np.vstack([self.first_touch, np.zeros(self.dim)])[old_row]
         pair_as_number = [1, 1j]
         mated_pairs = self.edge_pairs[~self.first_touch.any(axis=1)] @ pair_as_number
         continues = np.isin(edge_pairs[new_rows] @ pair_as_number, mated_pairs) | (not started)
@@ -267,12 +273,12 @@ class Joints:
         self.edge_pairs = edge_pairs
         self._arrange(law, place)
 
-    def update(self, closure: np.ndarray, sliding: np.ndarray) -> None:
-        """Advance all joints to a closure (k,) and by a sliding displacement (k,), both in m.
+    def update(self, closure: np.ndarray, shears: np.ndarray) -> None:
+        """Advance all joints to a closure (k,) and by shears (k, dim - 1), both in m.
 
         They take one increment of their laws, which changes their states and readings.
         """
-        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / self.reduction
+        d = np.column_stack([closure - self.delta[:, 0], shears]) / self.reduction
         for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
             joints.step.d[self.place[rows]] = d[rows]
         self.advance(1)
@@ -290,22 +296,24 @@ class Joints:
                     joints.pool.batch.advance(step)
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Trial step by increments d (k, 2) in m; the state of the joints is unchanged.
+        """Trial step by increments d (k, dim) in m; the state of the joints is unchanged.
 
-        Returns tractions (k, 2) in Pa, tangents (k, 2, 2) in Pa/m, stored energies (k,) in J/m2.
+        Returns tractions (k, dim) in Pa, tangents (k, dim, dim) in Pa/m, stored energies (k,) in
+        J/m2.
         """
-        F = np.empty((self.n, 2))
-        C = np.empty((self.n, 2, 2))
+        dim = self.dim
+        F = np.empty((self.n, dim))
+        C = np.empty((self.n, dim, dim))
         stored_energy = np.empty(self.n)
         for joints, rows in zip(self.by_law, self.rows_by_law, strict=True):
             m = len(rows)
             step = jl.Step(
                 d[rows] / self.reduction,
-                np.empty((m, 2)),
-                np.empty((m, 2, 2)),
+                np.empty((m, dim)),
+                np.empty((m, dim, dim)),
                 where=self.place[rows],
                 commit=False,
-                measures=np.empty((m, len(MEASURES) + 2)),
+                measures=np.empty((m, len(MEASURES) + dim)),
             )
             joints.pool.batch.advance(step)
             F[rows] = step.F
@@ -314,7 +322,7 @@ class Joints:
         return F / self.reduction, C / np.outer(self.reduction, self.reduction), stored_energy
 
     def stick_predictor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tractions (k, 2) and tangents (k, 2, 2) of virgin joints that stick, at d (k, 2) in m."""
+        """Tractions (k, dim), tangents (k, dim, dim) of virgin joints that stick, at d (k, dim)."""
         pulling = self.tensile_stiffness[self.law] * (self.damage < 1)
         return stick_response(d, self._stress_and_stiffness, pulling)
 

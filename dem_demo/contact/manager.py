@@ -87,7 +87,7 @@ class ContactManager:
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
         self.blocks = blocks = scene.blocks
         self.skins = scene.skins
-        self.outlines = Outlines(blocks, scene.run.corner_length, scene.run.soft)
+        self.outlines = Outlines(blocks, scene.run.corner_length, scene.run.soft, scene.thickness)
         self.max_overlap = scene.run.max_overlap * np.array([block.width for block in blocks])
         self.radius = np.array([block.reach for block in blocks])
         self.is_fixed = np.array([block.fixed for block in blocks])
@@ -126,7 +126,7 @@ class ContactManager:
 
         Corners that have left the range of their edge go on to the next corner or edge.
         """
-        arrays = self.contacts.step_arrays
+        arrays = self.contacts.corner_arrays
         arrays.bind(motion=motion, needs_rebuild=self.needs_rebuild)
         arrays.call("update_contacts")
 
@@ -267,7 +267,7 @@ class ContactManager:
         max_gap = DROP_GAP * self._skin(*pairs.T)
         max_depth = 1.5 * limit
         separation = np.empty((2, p))
-        arrays = self.outlines.step_arrays(motion)
+        arrays = self.outlines.corner_arrays(motion)
         inputs = [address(a) for a in (pairs, self.outlines.first_corner, max_gap, max_depth)]
         capacity = 0
         n_candidates = CAPACITY

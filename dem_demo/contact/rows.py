@@ -61,17 +61,17 @@ class ContactRows:
         )
 
     def assemble_forces(
-        self, n_blocks: int, traction: np.ndarray, stored_energy: np.ndarray | float = 0.0
+        self, n_blocks: int, joint_force: np.ndarray, stored_energy: np.ndarray | float = 0.0
     ) -> np.ndarray:
         """Return the forces (n_blocks, dof) of the joints on the motions of the blocks.
 
-        traction (k, dim) in Pa: normal stress and shear stresses that resist closure and shears.
+        joint_force (k, dim) in N: area times traction, which resists closure and shears.
         stored_energy (k,) in J/m2: a change of the area costs it. Forces in N, moments in N m.
         """
         k, _, both = self.kinematics.shape
         dof = both // 2
         energy = np.broadcast_to(stored_energy, k)[:, None]
-        force = np.einsum("kc,kcm->km", self.area[:, None] * traction, self.kinematics)
+        force = np.einsum("kc,kcm->km", joint_force, self.kinematics)
         force = -force - energy * self.area_gradient
         block = np.concatenate([self.block_a, self.block_b])
         place = dof * block[:, None] + np.arange(dof)

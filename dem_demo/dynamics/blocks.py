@@ -9,7 +9,7 @@ by the forces at the new positions.
 import numpy as np
 import pymunk
 
-from ..contact import ContactManager, Contacts, Outlines
+from ..contact import ContactManager, ContactRows, Outlines
 from ..scene import Drives, FacePressure, Scene, SceneError, Stress
 from .bolts import Bolts
 
@@ -113,12 +113,12 @@ class Blocks:
         self.motion[3:, rows] = 0.0
         self.velocity[:, rows] = 0.0
 
-    def critical_damping(self, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
+    def critical_damping(self, rows: ContactRows, stiffness: np.ndarray) -> np.ndarray:
         """Critical damping (k,) in N s/m of contacts with a stiffness (k,) in N/m.
 
         2 sqrt(stiffness * reduced mass of the two blocks), with half of a joint for each block.
         """
-        inverse_mass = self.inverse_mass[contacts.block_a] + self.inverse_mass[contacts.block_b]
+        inverse_mass = self.inverse_mass[rows.block_a] + self.inverse_mass[rows.block_b]
         reduced_mass = 0.5 / np.where(inverse_mass > 0, inverse_mass, np.inf)
         return 2.0 * np.sqrt(stiffness * reduced_mass)
 
@@ -155,7 +155,7 @@ def apply_loads(scene: Scene, blocks: Blocks, manager: ContactManager) -> np.nda
         )
     pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[manager.law]
     push = pressure * contacts.overlap_length.sum(axis=0) * scene.thickness
-    loads += contacts.assemble(blocks.motion, push, 0.0 * push)
+    loads += contacts.assemble_forces(len(loads), np.stack([push, 0.0 * push], axis=1))
     blocks.loads[:] = loads * blocks.is_mobile
     return blocks.loads - old_loads
 

@@ -17,6 +17,9 @@ and dashpots from the mean of their forces before and after the step, gravity an
 constant values. Joints have a potential of their own, the stored energy, and dissipate on the area
 that they have at the end of the step.
 
+In space, moments and angular velocities are about the principal axes of a block, so a gyroscopic
+moment acts too. It is taken at the mean of both angular velocities, where it does no work.
+
 "bolts" is the energy that rock bolts store and have dissipated by yielding, a function of their
 elongations. What leaves the balance for good. "friction": energy dissipated by the joints;
 "dashpots": by viscous damping; "discarded": stored energy of contacts that were removed while they
@@ -42,36 +45,39 @@ class EnergyBalance:
 
     energy (9,): in the order of `ENERGIES`. external_work: of drives, loads and water; turnover:
     sum of the absolute work of gravity, drives and loads, plus the energy at the start, to which
-    errors are related. start: the balance at time 0. forces (3, n, 3) in N: total, dashpots and
-    drives at the end of the last step; previous_forces (2, n, 3): dashpots and drives one step
-    before. area (k,) in m2: of the joints at the end of the last step; booked_dissipation (k,) in
-    J/m2: their dissipated energy, as entered in the balance. The compiled step writes all of these.
+    errors are related. start: the balance at time 0. forces (3, n, dof) in N: total, dashpots and
+    drives at the end of the last step; previous_forces (2, n, dof): dashpots and drives one step
+    before. booked_area (k,) in m2: of the joints at the end of the last step; booked_dissipation
+    (k,) in J/m2: their dissipated energy, as entered in the balance. The compiled step writes all
+    of these.
     """
 
-    def __init__(self, blocks: int) -> None:
+    def __init__(self, blocks: int, dof: int = 3) -> None:
         self.energy = np.zeros(len(ENERGIES))
         self.start = 0.0
-        self.forces = np.zeros((3, blocks, 3))
-        self.previous_forces = np.zeros((2, blocks, 3))
-        self.area = np.zeros(0)
+        self.forces = np.zeros((3, blocks, dof))
+        self.previous_forces = np.zeros((2, blocks, dof))
+        self.booked_area = np.zeros(0)
         self.booked_dissipation = np.zeros(0)
 
     def open(self, blocks: Blocks, joints: Joints, dt: float) -> None:
         """Set the energies at time 0, the time of the velocities in the blocks' motion."""
         half_step = 0.5 * dt * self.forces[0] / blocks.inertia
-        v = blocks.motion[3:].T
+        v = blocks.motion[len(blocks.motion) // 2 :].T
         self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - half_step**2)).sum()
-        self.energy[STORED] = self.area @ joints.stored_energy
+        self.energy[STORED] = self.booked_area @ joints.stored_energy
         self.energy[BOLTS] = blocks.bolts.pull()
         self.start = float(self.energy[KINETIC] + self.energy[STORED] + self.energy[BOLTS])
         self.energy[TURNOVER] = self.start
 
     def change_loads(self, blocks: Blocks, change: np.ndarray, dt: float) -> None:
-        """Correct the work of loads that change by `change` (n, 3) within a step dt (s).
+        """Correct the work of loads that change by `change` (n, dof) within a step dt (s).
 
         The step adds the work of the new loads; the trapezoidal rule takes their mean.
         """
-        self.energy[EXTERNAL_WORK] -= 0.5 * dt * (change * blocks.motion[3:].T).sum()
+        self.energy[EXTERNAL_WORK] -= (
+            0.5 * dt * (change * blocks.motion[len(blocks.motion) // 2 :].T).sum()
+        )
 
     @property
     def value(self) -> dict[str, float]:

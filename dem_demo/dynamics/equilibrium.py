@@ -15,12 +15,12 @@ contact manager keeps it as a negative closure offset.
 
 import numpy as np
 
-from ..contact import ContactManager, Contacts, Joints
+from ..contact import ContactManager, ContactRows, Contacts, Joints
 from ..scene import Scene
 from .blocks import Blocks, apply_loads
 from .relaxation import Verdict
 from .search import EquilibriumSearch, StaticSystem
-from .timestep import contact_kinematics
+from .timestep import scaled_kinematics
 
 MAX_UNBALANCED_RATIO = 1e-3  # unbalanced force of a stable block, relative to its weight
 STANDARD_GRAVITY = 9.81  # m/s2: for weights in a scene without gravity
@@ -50,11 +50,11 @@ def unbalanced_force_ratio(blocks: Blocks, force: np.ndarray) -> np.ndarray:
     return size / np.maximum(mass * acceleration, MIN_FORCE_SCALE * largest_load)
 
 
-def find_unbalanced(scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints) -> np.ndarray:
+def find_unbalanced(blocks: Blocks, rows: ContactRows, joints: Joints) -> np.ndarray:
     """Mask (n,) of blocks that their joints do not carry now, without dashpots and drives."""
-    push, shear = (joints.traction * contacts.length[:, None] * scene.thickness).T
-    stored_energy = joints.stored_energy * scene.thickness
-    joint_forces = contacts.assemble(blocks.motion, push, -shear, stored_energy)
+    joint_forces = rows.assemble_forces(
+        len(blocks.loads), rows.area[:, None] * joints.traction, joints.stored_energy
+    )
     unbalanced = joint_forces + blocks.gravity + blocks.loads + blocks.bolts.forces
     return unbalanced_force_ratio(blocks, unbalanced) > MAX_UNBALANCED_RATIO
 
@@ -76,11 +76,9 @@ def static_system(
     force = blocks.gravity + blocks.loads
     start = np.stack([manager.closure, sliding], axis=1)
     if lengths_changed:
-        stored_energy = joints.trial(start - joints.delta)[2] * scene.thickness
-        zero = np.zeros(joints.n)
-        length_forces = contacts.assemble(blocks.motion, zero, zero, stored_energy)
+        stored_energy = joints.trial(start - joints.delta)[2]
+        length_forces = contacts.assemble_forces(len(force), 0.0 * start, stored_energy)
         force = force + length_forces * blocks.is_mobile
-    opening_to_closure = np.array([-1.0, 1.0])[:, None]
     return StaticSystem(
         blocks.inertia[:, 0],
         blocks.radius,
@@ -89,8 +87,8 @@ def static_system(
         force,
         contacts.block_a,
         contacts.block_b,
-        contact_kinematics(blocks, contacts) * opening_to_closure,
-        contacts.length * scene.thickness,
+        scaled_kinematics(blocks, contacts),
+        contacts.area,
         start,
         joints,
         blocks.bolts.static(blocks.motion, blocks.inverse_sqrt_inertia),

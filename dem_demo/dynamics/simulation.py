@@ -24,6 +24,7 @@ import numpy as np
 
 from jointlaw.support.files import write_files
 
+from ..compiled import StepArrays, function_address
 from ..contact import MAX_SKIN_UNTIL_REBUILD, STATE_PARTS, ContactManager, Contacts, Joints
 from ..scene import Files, Scene, SceneError, parse
 from .blocks import MAX_SKIN_PER_STEP, Blocks, apply_loads
@@ -47,7 +48,7 @@ FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
 IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
 MAX_HALVINGS = 8  # of a time step that was chosen automatically
 FILE = "state.npz"
-VERSION = 12
+VERSION = 13
 UPDATED_IN_PLACE = (  # arrays of the state that the compiled step, or views of them, refer to
     "blocks.motion",
     "blocks.velocity",
@@ -77,13 +78,13 @@ STATE = (
     "manager.law",
     "manager.closure_offset",
     "energy_balance.start",
-    "energy_balance.area",
+    "energy_balance.booked_area",
     "energy_balance.booked_dissipation",
     "unstable",
     "verdict",
     "initial",
 )
-CONTACT_ROWS = "contacts.corner", "contacts.edge"  # from which the contacts are made
+CONTACT_KEYS = "contacts.keys"  # from which the contacts are made
 SavedState = dict[str, np.ndarray]  # a copy of everything that later steps depend on
 
 
@@ -209,10 +210,11 @@ class Simulation:
         blocks = self.blocks
         contacts = self.contacts
         is_removed = np.isin(contacts.block_a, removed) | np.isin(contacts.block_b, removed)
-        thickness = is_removed * self.scene.thickness
-        push, shear = thickness * contacts.length * self.joints.traction.T
-        stored_energy = thickness * self.joints.stored_energy
-        blocks.support += contacts.assemble(blocks.motion, push, -shear, stored_energy)
+        blocks.support += contacts.assemble_forces(
+            len(blocks.support),
+            (is_removed * contacts.area)[:, None] * self.joints.traction,
+            is_removed * self.joints.stored_energy,
+        )
         blocks.remove(removed)
         self.manager.needs_rebuild[removed] = True
         self.arrays.rebuild = 1
@@ -309,7 +311,7 @@ class Simulation:
         self.initial = blocks.motion.copy()
         joints.update(manager.closure, sliding)
         blocks.bolts.pull()
-        self.unstable = find_unbalanced(scene, blocks, self.contacts, joints)
+        self.unstable = find_unbalanced(blocks, self.contacts, joints)
         if not self.unstable.any():
             verdict = Verdict.EQUILIBRIUM
         elif verdict is Verdict.EQUILIBRIUM:  # a search that ended before forces balance
@@ -323,7 +325,7 @@ class Simulation:
         blocks.motion[3:][drives.axes, drives.rows] = drives.aim
         manager.update(blocks.motion)
         balance = self.energy_balance
-        balance.area = self.contacts.length * scene.thickness
+        balance.booked_area = self.contacts.area.copy()
         balance.booked_dissipation = joints.dissipated_energy.copy()
         self.bind()
         self.arrays.call("compute_forces", 0.5 * self.dt)
@@ -339,8 +341,10 @@ class Simulation:
         drives = blocks.drives
         manager = self.manager
         balance = self.energy_balance
-        arrays = self.contacts.step_arrays
-        arrays.thickness = self.scene.thickness
+        joints = self.joints
+        contacts = self.contacts
+        contacts.corner_arrays.bind(motion=blocks.motion, needs_rebuild=manager.needs_rebuild)
+        arrays = StepArrays(n_blocks=len(blocks.names), n_contacts=joints.n, dim=2, dof=3)
         arrays.law_steps = run.law_steps
         arrays.dashpot_normal = run.dashpot_normal
         arrays.dashpot_shear = run.dashpot_shear
@@ -353,9 +357,17 @@ class Simulation:
         )  # fmt: skip
         arrays.bind(driven_block=drives.rows, driven_axis=drives.axes, driven_velocity=drives.aim)
         arrays.bind(manager, "max_overlap", "closure_offset", "needs_rebuild", "rebuilt_at")
-        arrays.bind(balance, "forces", "previous_forces", "area", "booked_dissipation", "energy")
+        arrays.bind(
+            balance, "forces", "previous_forces", "booked_area", "booked_dissipation", "energy"
+        )
         arrays.bind(self.limit, "checked_stiffness")
-        self.joints.bind(arrays)
+        arrays.bind(
+            contacts, "block_a", "block_b", "closure", "area", "kinematics", "area_gradient",
+            "rates", geometry=contacts.corner_arrays,
+        )  # fmt: skip
+        arrays.update_geometry = function_address("update_contacts")
+        joints.bind(arrays)
+        arrays.call("compute_rates")
         self.arrays = arrays
 
     # ------------------------------------------------------------------ contacts that change
@@ -384,10 +396,10 @@ class Simulation:
             limit.checked_stiffness[:] = 0.0
         pairs = blocks.neighbour_pairs()
         old_row = manager.rebuild(blocks.motion, pairs, keep_closure=False)
-        stored_energy = balance.area * joints.stored_energy
+        stored_energy = balance.booked_area * joints.stored_energy
         stored_energy[old_row[old_row >= 0]] = 0.0
         balance.energy[DISCARDED] += stored_energy.sum()
-        balance.area = np.append(balance.area, 0.0)[old_row]
+        balance.booked_area = np.append(balance.booked_area, 0.0)[old_row]
         limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[old_row]
         joints.rearrange(old_row, manager.law, manager.edge_pairs, started=True)
         balance.booked_dissipation = joints.dissipated_energy.copy()
@@ -444,7 +456,7 @@ class Simulation:
         changed = np.flatnonzero(has_changed)
         is_longer = ratio[changed] > 1
         new_energy = joints.stored_energy[changed]  # J/m2
-        balance.area[changed] = length[changed] * thickness
+        balance.booked_area[changed] = self.contacts.area[changed]
         if is_longer.any():
             restarted = changed[is_longer]
             closure = manager.closure[restarted]
@@ -460,7 +472,7 @@ class Simulation:
 
     def area_fractions(self, moving: int, base: int) -> np.ndarray:
         """Fraction (k,) of each contact in the area of the joint between two blocks."""
-        area = self.energy_balance.area * self.manager.between(moving, base)
+        area = self.energy_balance.booked_area * self.manager.between(moving, base)
         return area / max(area.sum(), TINY)
 
     def shear_displacement(self, moving: int, base: int) -> float:
@@ -471,7 +483,7 @@ class Simulation:
 
     def state(self) -> SavedState:
         """A copy of everything that later steps depend on."""
-        arrays = {path: np.array(attrgetter(path)(self)) for path in (*STATE, *CONTACT_ROWS)}
+        arrays = {path: np.array(attrgetter(path)(self)) for path in (*STATE, CONTACT_KEYS)}
         return self.joints.snapshot() | arrays
 
     def _restore(self, saved: SavedState, step: float | None) -> None:
@@ -487,7 +499,7 @@ class Simulation:
         manager = self.manager
         blocks = self.blocks
         blocks.remove(np.flatnonzero(blocks.is_removed).tolist())
-        corner, edge = (saved[path] for path in CONTACT_ROWS)
+        corner, edge = saved[CONTACT_KEYS]
         manager.contacts = Contacts(manager.outlines, corner, edge, blocks.motion)
         self.joints.restore(saved, manager.law, manager.edge_pairs)
         if step:
@@ -547,7 +559,7 @@ def _read_state(file: Path) -> tuple[int, Scene | None, SavedState]:
     files = Files(known=json.loads(str(data["files"])))
     scene = parse(str(data["scene"]), str(file), files)
     joints = [f"{part}-{i}" for part in STATE_PARTS for i in range(len(scene.laws))]
-    names = (*STATE, *CONTACT_ROWS, "first_touch", *joints)
+    names = (*STATE, CONTACT_KEYS, "first_touch", *joints)
     return version, scene, {name: data[name] for name in names}
 
 

@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array, diags, vstack
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-from ..contact import Contacts, Joints, Outlines
+from ..contact import ContactRows, Joints, Outlines
 from ..scene import Scene, SceneError
 from .blocks import Blocks
 from .search import free_motion_matrix
@@ -46,7 +46,7 @@ class TimeStepLimit:
         self.checked_stiffness = np.zeros(0)
 
     def update(
-        self, scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints, dt: float = np.inf
+        self, scene: Scene, blocks: Blocks, rows: ContactRows, joints: Joints, dt: float = np.inf
     ) -> None:
         """Find the present stability limit from stiffness, dashpots and lever arms.
 
@@ -55,24 +55,26 @@ class TimeStepLimit:
         fallen well below the lowest one so far.
         """
         stiffness = np.maximum(
-            joints.stiffness, joints.interpolate("stiffness", "closure", contacts.closure)
+            joints.stiffness, joints.interpolate("stiffness", "closure", rows.closure)
         )
         stiffness = np.maximum(stiffness, MIN_STIFFNESS * stiffness.max(initial=0.0))
-        area = contacts.length * scene.thickness
-        stiffness = stiffness * np.maximum(area, MIN_AREA * area.max(initial=0.0))
+        area = np.maximum(rows.area, MIN_AREA * rows.area.max(initial=0.0))
+        stiffness = stiffness * area
         self.checked_stiffness = stiffness
         run = scene.run
-        critical = blocks.critical_damping(contacts, stiffness)
+        critical = blocks.critical_damping(rows, stiffness)
         larger_fraction = max(run.dashpot_normal, run.dashpot_shear)
-        self.current = bound_of_blocks(blocks, contacts, stiffness, larger_fraction * critical)
+        self.current = bound_of_blocks(blocks, rows, stiffness, larger_fraction * critical)
         is_allowed = dt <= MAX_FRACTION_OF_LIMIT * self.current
         if is_allowed and self.current > RECOMPUTE_BELOW * self.lowest_bound:
             return
         self.lowest_bound = min(self.lowest_bound, self.current)
-        dashpots = np.concatenate([run.dashpot_normal * critical, run.dashpot_shear * critical])
+        dim = rows.rates.shape[1]
+        fractions = [run.dashpot_normal, *[run.dashpot_shear] * (dim - 1)]
+        dashpots = np.concatenate([fraction * critical for fraction in fractions])
         bolts = blocks.bolts
-        rates = opening_and_sliding_rates(blocks, contacts)
-        springs = np.tile(stiffness, 2)
+        rates = closure_and_shear_rates(blocks, rows)
+        springs = np.tile(stiffness, dim)
         if bolts.n:
             bolt_rates = bolts.rates(blocks.motion, blocks.inverse_sqrt_inertia, blocks.is_free)
             rates = vstack([rates, bolt_rates]).tocsr()
@@ -97,93 +99,91 @@ class TimeStepLimit:
         self.checked_stiffness = growth * self.checked_stiffness
 
 
-def _spring_sums(block: np.ndarray, at: np.ndarray, springs: np.ndarray, n: int) -> np.ndarray:
-    """Sums (4, n) of springs on blocks: of stiffness, and of it times x, y and x^2 + y^2.
+def _block_stiffness(
+    block: np.ndarray, kinematics: np.ndarray, springs: np.ndarray, n: int
+) -> np.ndarray:
+    """Stiffness (n, dof, dof) of each block alone on springs that act in all directions.
 
-    block (k,): numbers; at (k,): places relative to the centroids, complex, m; springs (k,).
+    block (k,): numbers of the blocks; kinematics (k, dim, dof): displacements of the springs by the
+    motions of the blocks; springs (k,) in N/m.
     """
-    parts = springs, springs * at.real, springs * at.imag, springs * np.abs(at) ** 2
-    return np.array([np.bincount(block, part, n) for part in parts])
+    dof = kinematics.shape[2]
+    stiffness = np.empty((n, dof, dof))
+    for i in range(dof):
+        for j in range(i + 1):
+            products = springs * (kinematics[:, :, i] * kinematics[:, :, j]).sum(axis=1)
+            stiffness[:, i, j] = stiffness[:, j, i] = np.bincount(block, products, n)
+    return stiffness
 
 
-def _largest_eigenvalue(sums: np.ndarray, inverse_sqrt_inertia: np.ndarray) -> float:
-    """Largest eigenvalue of any single block (n,) on springs that act in all directions.
+def _largest_eigenvalue(stiffness: np.ndarray, inverse_sqrt_inertia: np.ndarray) -> float:
+    """Largest eigenvalue of any single block.
 
-    sums (4, n): of `_spring_sums`; inverse_sqrt_inertia (n, 3): zero for prescribed motions.
+    stiffness (n, dof, dof): of `_block_stiffness`; inverse_sqrt_inertia (n, dof): zero for
+    prescribed motions.
     """
-    k, kx, ky, k_rotation = sums
-    zero = np.zeros_like(k)
-    K = np.array([[k, zero, -ky], [zero, k, kx], [-ky, kx, k_rotation]]).transpose(2, 0, 1)
     # The largest eigenvalue of a block is at most its trace, and at least its largest diagonal
     # entry. Few blocks can have the largest of all.
     root = inverse_sqrt_inertia
-    diagonal = np.stack([k, k, k_rotation], axis=1) * root**2
+    diagonal = np.diagonal(stiffness, axis1=1, axis2=2) * root**2
     can_be_largest = diagonal.sum(axis=1) >= (1 - 1e-9) * diagonal.max(initial=0.0)
-    K = K[can_be_largest]
+    K = stiffness[can_be_largest]
     root = root[can_be_largest]
     return float(np.linalg.eigvalsh(K * root[:, :, None] * root[:, None, :]).max(initial=0.0))
 
 
-def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> float:
+def bound_of_blocks(blocks: Blocks, rows: ContactRows, stiffness, dashpot) -> float:
     """Lower bound (s) of the largest stable step; infinite without springs.
 
-    stiffness (k,) in N/m and dashpot (k,) in N s/m act along normal and tangent alike; bolts act
-    too. A spring
-    between two movable blocks stores at most twice the energy that each alone would store in it, so
-    the largest eigenvalue is at most the one of the worst block on springs twice as stiff.
+    stiffness (k,) in N/m and dashpot (k,) in N s/m act in all directions alike; bolts act too. A
+    spring between two movable blocks stores at most twice the energy that each alone would store in
+    it, so the largest eigenvalue is at most the one of the worst block on springs twice as stiff.
     """
-    n = len(blocks.is_free)
+    n, dof = blocks.is_free.shape
     is_movable = blocks.is_free.any(axis=1)
-    weight = 1.0 + (is_movable[contacts.block_a] & is_movable[contacts.block_b])
-    centroid = blocks.motion[0] + 1j * blocks.motion[1]
+    weight = 1.0 + (is_movable[rows.block_a] & is_movable[rows.block_b])
+    of_a = rows.kinematics[:, :, :dof]
+    of_b = rows.kinematics[:, :, dof:]
 
-    def sums_of_contacts(springs: np.ndarray) -> np.ndarray:
-        return sum(
-            _spring_sums(block, contacts.position - centroid[block], weight * springs, n)
-            for block in (contacts.block_a, contacts.block_b)
-        )
+    def stiffness_of_blocks(springs: np.ndarray) -> np.ndarray:
+        K = _block_stiffness(rows.block_a, of_a, weight * springs, n)
+        return K + _block_stiffness(rows.block_b, of_b, weight * springs, n)
 
-    springs = sums_of_contacts(stiffness)
+    K = stiffness_of_blocks(stiffness)
     bolts = blocks.bolts
     if bolts.n:
-        start, end = bolts.ends(blocks.motion).T
-        for block, at in ((bolts.block_a, start), (bolts.block_b, end)):
-            springs = springs + _spring_sums(block, at - centroid[block], 2 * bolts.stiffness, n)
-    k = _largest_eigenvalue(springs, blocks.inverse_sqrt_inertia)
-    c = _largest_eigenvalue(sums_of_contacts(dashpot), blocks.inverse_sqrt_inertia)
+        elongation = bolts.kinematics(blocks.motion, np.ones((n, dof)))[:, None, :]
+        K += _block_stiffness(bolts.block_a, elongation[:, :, :dof], 2 * bolts.stiffness, n)
+        K += _block_stiffness(bolts.block_b, elongation[:, :, dof:], 2 * bolts.stiffness, n)
+    k = _largest_eigenvalue(K, blocks.inverse_sqrt_inertia)
+    c = _largest_eigenvalue(stiffness_of_blocks(dashpot), blocks.inverse_sqrt_inertia)
     return 4 / (c + np.sqrt(c * c + 4 * k)) if k else np.inf
 
 
-def contact_kinematics(blocks: Blocks, contacts: Contacts) -> np.ndarray:
-    """Rates of opening and sliding by the motions of block a, then of block b: (k, 2, 6).
+def scaled_kinematics(blocks: Blocks, rows: ContactRows) -> np.ndarray:
+    """Rates of closure and shears by the motions of block a, then of block b: (k, dim, 2 dof).
 
-    Motions are scaled by the square root of their inertia; rows of prescribed motions are zero.
+    Motions are scaled by the square root of their inertia; columns of prescribed motions are zero.
     """
-    parts = []
-    for block, sign in ((contacts.block_a, -1.0), (contacts.block_b, 1.0)):
-        arm = contacts.position - (blocks.motion[0] + 1j * blocks.motion[1])[block]
-        direction = sign * np.stack([contacts.normal, -1j * contacts.normal])
-        rotation = (arm.conj() * direction).imag
-        rates = np.stack([direction.real, direction.imag, rotation], axis=2)
-        parts.append(rates * blocks.inverse_sqrt_inertia[block])
-    return np.concatenate(parts, axis=2).transpose(1, 0, 2)
+    root = blocks.inverse_sqrt_inertia
+    of_both = np.concatenate([root[rows.block_a], root[rows.block_b]], axis=1)
+    return rows.kinematics * of_both[:, None, :]
 
 
-def opening_and_sliding_rates(blocks: Blocks, contacts: Contacts) -> csr_array:
-    """Matrix (2 k, free motions) from motions of the blocks to the rates of the contacts.
+def closure_and_shear_rates(blocks: Blocks, rows: ContactRows) -> csr_array:
+    """Matrix (dim k, free motions) from motions of the blocks to the rates of the contact points.
 
-    Opening rates (k,) along the normal, then sliding rates (k,): `contact_kinematics` without the
-    prescribed motions.
+    Closure rates (k,), then shear rates (k,): `scaled_kinematics` without the prescribed motions.
     """
-    kinematics = contact_kinematics(blocks, contacts)
-    return free_motion_matrix(contacts.block_a, contacts.block_b, kinematics, blocks.is_free)
+    kinematics = scaled_kinematics(blocks, rows)
+    return free_motion_matrix(rows.block_a, rows.block_b, kinematics, blocks.is_free)
 
 
 def largest_step(rates: csr_array, stiffness: np.ndarray, dashpot: np.ndarray) -> float:
     """Largest stable step (s); infinite without stiffness.
 
-    rates (2 k, m): of `opening_and_sliding_rates`; stiffness (2 k,) in N/m; dashpot (2 k,) in N
-    s/m. The largest eigenvalue of dt^2 K + 2 dt C must be 4. Any vector gives a step that is too
+    rates (dim k, m): of `closure_and_shear_rates`; stiffness (dim k,) in N/m; dashpot (dim k,) in
+    N s/m. The largest eigenvalue of dt^2 K + 2 dt C must be 4. Any vector gives a step that is too
     long, the eigenvector of the step before a better one: two or three eigenproblems suffice.
     """
     if 0 in rates.shape or not stiffness.any():
@@ -224,9 +224,13 @@ def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: fl
     """
     length = np.maximum(outlines.edge_length, outlines.corner_length)
     springs = stiffness * scene.thickness * length  # twice a half
-    sums = sum(
-        _spring_sums(outlines.block, outlines.local_corner[end], springs, len(blocks.is_free))
-        for end in (np.arange(len(outlines.block)), outlines.next)
-    )
-    largest = _largest_eigenvalue(sums, blocks.inverse_sqrt_inertia)
+    zero = np.zeros(len(length))
+    K = np.zeros((*blocks.is_free.shape, 3))
+    for end in (np.arange(len(length)), outlines.next):
+        arm = outlines.local_corner[end]
+        along_x = [zero + 1.0, zero, -arm.imag]
+        along_y = [zero, zero + 1.0, arm.real]
+        kinematics = np.transpose([along_x, along_y], (2, 0, 1))
+        K += _block_stiffness(outlines.block, kinematics, springs, len(K))
+    largest = _largest_eigenvalue(K, blocks.inverse_sqrt_inertia)
     return 2 / np.sqrt(largest) if largest else np.inf

@@ -9,7 +9,8 @@ from jointlaw.native.build import library_name as law_library_name
 from . import layout
 
 HERE = Path(__file__).parent
-SOURCES = tuple(HERE / name for name in ("blocks.c", "bolts.c", "relaxation.c", "face_contacts.c"))
+NAMES = ("blocks.c", "corners.c", "bolts.c", "relaxation.c", "face_contacts.c")
+SOURCES = tuple(HERE / name for name in NAMES)
 BUILT = HERE / "built"  # the library, and layout.h
 
 

@@ -1,4 +1,4 @@
-/* export.h: marks the functions that Python calls */
+/* export.h: marks the functions that Python calls, and functions that are always inlined */
 #ifndef DEM_EXPORT_H
 #define DEM_EXPORT_H
 #ifdef __cplusplus
@@ -10,5 +10,10 @@
 #define EXPORT IN_C __declspec(dllexport)
 #else
 #define EXPORT IN_C __attribute__((visibility("default")))
+#endif
+#ifdef __GNUC__
+#define INLINE static inline __attribute__((always_inline))
+#else
+#define INLINE static inline
 #endif
 #endif

@@ -154,7 +154,7 @@ def _read_joints(sim: Simulation) -> dict[str, np.ndarray]:
         "slipping": joints.slipping,
         "separated": joints.separated,
         "length_m": contacts.length,
-        "slip_rate_m/s": contacts.sliding_rate,
+        "slip_rate_m/s": contacts.rates[:, 1],
     }
     return {name: column[contacts.length > 0] for name, column in columns.items()}
 

@@ -20,7 +20,7 @@ import jointlaw as jl
 
 from ..contact import ContactManager, Contacts
 from ..dynamics.blocks import Blocks, apply_loads
-from ..dynamics.timestep import opening_and_sliding_rates
+from ..dynamics.timestep import closure_and_shear_rates
 from ..output.monitors import slip_distance
 from ..scene import Scene
 
@@ -72,7 +72,7 @@ def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBala
         bears &= ~(excluded[contacts.block_a] | excluded[contacts.block_b])
     bearing = np.flatnonzero(bears)
     count = len(contacts.length)
-    motions = opening_and_sliding_rates(blocks, contacts).T.tocsr()  # (free motions, 2 contacts)
+    motions = -closure_and_shear_rates(blocks, contacts).T.tocsr()  # (free motions, 2 contacts)
     load = ((blocks.gravity + blocks.loads) * blocks.inverse_sqrt_inertia)[blocks.is_free]
     if excluded is not None:
         block_of_motion = np.nonzero(blocks.is_free)[0]
@@ -92,7 +92,7 @@ def force_balance(scene: Scene, excluded: np.ndarray | None = None) -> ForceBala
         motions[:, bearing],
         motions[:, count + bearing],
         load,
-        contacts.length[bearing] * scene.thickness,
+        contacts.area[bearing],
         manager.law[bearing],
         strengths,
         bolt_motions[:, np.flatnonzero(holds)],

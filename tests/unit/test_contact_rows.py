@@ -18,7 +18,7 @@ def test_forces_do_the_work_of_the_joints(dim, dof):
     traction = rng.normal(size=(k, dim))
     energy = rng.uniform(size=k)
     velocity = rng.normal(size=(4, dof))
-    force = rows.assemble_forces(4, traction, energy)
+    force = rows.assemble_forces(4, rows.area[:, None] * traction, energy)
     both = np.concatenate([velocity[rows.block_a], velocity[rows.block_b]], axis=1)
     displacement_rate = np.einsum("kcm,km->kc", rows.kinematics, both)
     power = rows.area @ (traction * displacement_rate).sum(axis=1)

@@ -53,8 +53,6 @@ class PlainContacts:
         self.length, self.overlap_length, gradient, rotation = _lengths(
             standing, along, self.tilt_sine, tilt_cosine, overlap, gradient, rotation
         )
-        self.length_gradient = sign * gradient * direction
-        self.length_per_rotation = sign * rotation
         # At its limit the range of the corner meets another one: of the next corner, along a side
         # of this corner, or of the next edge. The one that is rotated less comes next, and the
         # limit is where both are equally deep. Where a side is raised, its corner comes next. Drawn
@@ -72,6 +70,27 @@ class PlainContacts:
         in_frame = velocity * self.normal.conj()
         self.opening_rate = in_frame.real
         self.sliding_rate = -in_frame.imag
+        self.rates = np.stack([-self.opening_rate, self.sliding_rate], axis=1)
+        self.area = o.thickness * self.length
+        # of the area by displacement and rotation of b relative to a, at the contact
+        self.gradient = o.thickness * sign * gradient * direction
+        self.per_rotation = o.thickness * sign * rotation
+
+    def assemble(self, motion, push, shear, energy=0.0):
+        """Forces and torques (blocks, 3) on the blocks at a motion (6, blocks), in N and N m.
+
+        push, shear (k,) in N: forces on block b along the normal and in the direction of sliding;
+        the opposite acts on block a at the same position. energy (k,) in J/m2: a change of the area
+        costs it.
+        """
+        force = (push - 1j * shear) * self.normal - energy * self.gradient
+        couple = energy * self.per_rotation
+        centroid = motion[0] + 1j * motion[1]
+        out = np.zeros((motion.shape[1], 3))
+        for block, sign in ((self.block_a, -1.0), (self.block_b, 1.0)):
+            torque = ((self.position - centroid[block]).conj() * force).imag - couple
+            np.add.at(out, block, sign * np.stack([force.real, force.imag, torque], axis=1))
+        return out
 
 
 def _overlaps(to_end, whole_side, mean, transition_length):
@@ -153,14 +172,15 @@ def plain_step(sim, velocity, dt):
     """
     scene = sim.scene
     blocks = sim.blocks
-    contacts = sim.contacts
+    now = sim.contacts
+    contacts = PlainContacts(now.outlines, now.corner, now.edge, sim.blocks.motion)
     joints = sim.joints
     drives = blocks.drives
     balance = sim.energy_balance
-    area = contacts.length * scene.thickness
+    area = contacts.area
     motion = blocks.motion
     push, shear = (area * part for part in joints.traction.T)
-    energy = joints.stored_energy * scene.thickness  # J/m: a change of the length costs this
+    energy = joints.stored_energy
     forces = np.zeros((3, *blocks.is_free.shape))
     total, dashpots, reactions = forces
     critical = blocks.critical_damping(contacts, joints.stiffness * area)

@@ -223,7 +223,7 @@ def displace(sim, x, y):
 def peak_friction_angle(sim):
     """Largest friction angle (degrees) while the drive moves the block."""
     until(sim, 0.2)
-    forces = np.array(until(sim, 0.5, lambda: sim.energy_balance.area @ sim.joints.traction))
+    forces = np.array(until(sim, 0.5, lambda: sim.energy_balance.booked_area @ sim.joints.traction))
     return np.degrees(np.arctan(np.abs(forces[:, 1]) / forces[:, 0])).max()
 
 

@@ -15,7 +15,7 @@ from running import until
 from scene_text import ROCK, block, coulomb, lines, on_base
 
 from dem_demo import SceneError, Simulation, load, parse
-from dem_demo.compiled import LawJointArrays, StepArrays
+from dem_demo.compiled import CornerArrays, LawJointArrays, StepArrays
 from dem_demo.contact import tabulate_first_loading
 from dem_demo.dynamics import simulation
 from dem_demo.native import build, layout
@@ -43,10 +43,8 @@ GEOMETRY = (
     "normal",
     "closure",
     "length",
-    "length_gradient",
-    "length_per_rotation",
-    "opening_rate",
-    "sliding_rate",
+    "area",
+    "rates",
     "tilt_sine",
     "overlap_length",
     "range_margin",
@@ -81,7 +79,7 @@ def test_a_compiled_step_agrees_with_plain_numpy(name, steps):
             np.testing.assert_allclose(compiled, expected, rtol=0, atol=1e-11 * size, err_msg=part)
         assert (c.corner_takes_over == plain.corner_takes_over).all()
         force, energies, velocity = plain_step(sim, sim.blocks.drives.aim, dt)
-        scale = np.abs(c.length[:, None] * sim.joints.traction).max(initial=0.0)
+        scale = np.abs(c.area[:, None] * sim.joints.traction).max(initial=0.0)
         scale = max(scale, float(np.abs(sim.blocks.gravity).max()))
         np.testing.assert_allclose(sim.energy_balance.forces, force, rtol=0, atol=1e-12 * scale)
         tiny = 1e-12 * scale * dt / sim.blocks.inertia.min()
@@ -97,9 +95,13 @@ def test_a_compiled_step_agrees_with_plain_numpy(name, steps):
 def test_python_and_c_have_the_same_structures():
     """The built header is made of the present declaration, without padding; C uses every field."""
     header = (build.BUILT / "layout.h").read_text(encoding="utf-8")
-    source = (build.HERE / "blocks.c").read_text(encoding="utf-8")
     assert header == layout.layout_h()
-    for pointer, structure in (("law", LawJointArrays), ("sim", StepArrays)):
+    for file, pointer, structure in (
+        ("blocks.c", "law", LawJointArrays),
+        ("blocks.c", "sim", StepArrays),
+        ("corners.c", "plane", CornerArrays),
+    ):
+        source = (build.HERE / file).read_text(encoding="utf-8")
         fields = [name for name, _ in structure._fields_]
         assert ctypes.sizeof(structure) == 8 * len(fields)
         assert set(re.findall(rf"\b{pointer}->(\w+)", source)) <= {*fields}

@@ -104,10 +104,11 @@ def test_the_floor_bears_the_weight_and_the_load_above(sides):
     fixed = np.array([block.fixed for block in sim.scene.blocks])
     load = -WEIGHT * (DEPTH - 10) * 10
     assert sim.blocks.loads[~fixed, 1].sum() == pytest.approx(load, rel=1e-4)
-    stress, shear = sim.joints.traction.T
-    stored = sim.joints.stored_energy * sim.scene.thickness  # cost of a change of length
-    area = sim.energy_balance.area
-    joint_forces = sim.contacts.assemble(sim.blocks.motion, area * stress, -area * shear, stored)
+    joint_forces = sim.contacts.assemble_forces(
+        len(fixed),
+        sim.contacts.area[:, None] * sim.joints.traction,
+        sim.joints.stored_energy,
+    )
     carried = joint_forces[fixed, 1].sum()
     above = (sim.blocks.gravity + sim.blocks.loads)[~fixed, 1].sum()
     assert carried == pytest.approx(above, rel=1e-4)

@@ -13,7 +13,7 @@ from scipy.sparse import diags, hstack
 from dem_demo import Simulation, load, parse
 from dem_demo.contact import ContactManager
 from dem_demo.dynamics.blocks import Blocks
-from dem_demo.dynamics.timestep import opening_and_sliding_rates
+from dem_demo.dynamics.timestep import closure_and_shear_rates
 from dem_demo.output.run import run_to_failure
 from dem_demo.studies.strength import LOG_FACTOR, factor_of_safety, settled, weakened
 
@@ -56,7 +56,7 @@ def upper_factor(scene, low=0.25, high=4.0, tolerance=1e-3):
     contacts = manager.contacts
     bearing = np.flatnonzero(contacts.length > 0)
     k = len(contacts.length)
-    rates = opening_and_sliding_rates(blocks, contacts)
+    rates = -closure_and_shear_rates(blocks, contacts)
     directions = rates[np.concatenate([bearing, k + bearing])].T  # of normal and shear forces
     friction = np.array([law.friction for law in scene.laws.values()])[manager.law[bearing]]
     n = len(bearing)

@@ -31,6 +31,7 @@ from .output.pictures import Pictures
 from .output.record import RunRecord, format_blocks, format_outcome, list_blocks, report_lines
 from .output.run import run, steps_to
 from .scene import TEMPLATE, Scene, SceneError, load, shipped
+from .scene.laws import law_warnings
 from .studies import ablate, compare, strength
 from .studies.limit_analysis import format_bound, limit_factor
 
@@ -137,12 +138,13 @@ def _run(options: argparse.Namespace) -> None:
     with _messages_for(options.json):
         if options.command == "resume":
             sim = Simulation.load(options.state, options.step)
+            _print_law_warnings(sim.scene)
             print(
                 "the run continues with the scene of its saved state: changes of the scene file "
                 "since then have no effect"
             )
         else:
-            sim = Simulation(load(options.scene))
+            sim = Simulation(_load_scene(options.scene))
         _describe(sim, options.until, options.format is not None)
         dt = sim.dt
         record, summary = run(sim, options.out, options.until, options.format, options.vtk)
@@ -150,6 +152,19 @@ def _run(options: argparse.Namespace) -> None:
         print(f"results in {options.out}")
     if options.json:
         print((options.out / SUMMARY).read_text(encoding="utf-8"), end="")
+
+
+def _load_scene(source: str) -> Scene:
+    """Read a scene, and print the warnings in the parameter files of its laws."""
+    scene = load(source)
+    _print_law_warnings(scene)
+    return scene
+
+
+def _print_law_warnings(scene: Scene) -> None:
+    """Print the warnings in the parameter files of the laws of a scene to stderr."""
+    for text in law_warnings(scene.files):
+        print(f"warning, {text}", file=sys.stderr)
 
 
 def _report(sim: Simulation, record: RunRecord, summary: dict, initial_dt: float) -> None:
@@ -267,7 +282,7 @@ def _new(options: argparse.Namespace) -> None:
 
 def _check(options: argparse.Namespace) -> None:
     """Validate a scene, and warn of laws that do not suit the stresses of their joints."""
-    sim = Simulation(load(options.scene))
+    sim = Simulation(_load_scene(options.scene))
     _describe(sim)
     if sim.verdict:
         _print_limit_analysis(sim.scene)
@@ -335,13 +350,13 @@ def _warn_of_bond(name: str, law: JointLaw, stress: float) -> None:
 def _ablate(options: argparse.Namespace) -> None:
     """Run a scene without each of its ingredients in turn."""
     options.out.mkdir(parents=True, exist_ok=True)  # raises before the work if it cannot be made
-    print(ablate.write(ablate.ablate(load(options.scene), options.until), options.out))
+    print(ablate.write(ablate.ablate(_load_scene(options.scene), options.until), options.out))
     print(f"results in {options.out}: {ABLATION}")
 
 
 def _compare(options: argparse.Namespace) -> None:
     """Run each rock of a scene with its own laws and with Coulomb's law."""
-    scene = load(options.scene)
+    scene = _load_scene(options.scene)
     if not scene.rocks:
         raise ValueError(f"{options.scene} has no [[rock]] to compare")
     for row in compare.compare(scene, options.seeds, options.until):
@@ -357,7 +372,7 @@ def _compare(options: argparse.Namespace) -> None:
 def _reduce_strength(options: argparse.Namespace) -> None:
     """Compute factor of safety and critical tilt of each rock."""
     with _messages_for(options.json):
-        scene = load(options.scene)
+        scene = _load_scene(options.scene)
         laws = scene.laws.values()
         if any(isinstance(law, JointLaw) and law.slope_wear < np.inf for law in laws):
             print("slope_wear has no effect on factor and tilt: they are too high")

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import jointlaw as jl
+from jointlaw.parameters.about import ABOUT_TABLE, About
 from jointlaw.parameters.rock import require_rock
 
 from .keys import TABLE, Tables, overlay
@@ -45,7 +46,10 @@ def build_law(data: Tables, where: str, files: Files) -> jl.Law:
         name = str(data["from"])
         if name not in files:
             path = files.folder / name
-            files[name] = jl.presets.load_any(str(path) if path.is_file() else name).to_toml()
+            law_file = str(path) if path.is_file() else name
+            files[name] = "\n".join(
+                [jl.presets.load_any(law_file).to_toml(), _about_of(path).to_toml()]
+            )
         own = overlay(tomllib.loads(files[name]), own)
     law: jl.Law = jl.JointLaw.from_dict({"plane": 0.0, **own}, where)
     own = {name: value for name, value in vars(law).items() if name in CONSTANTS}
@@ -55,6 +59,24 @@ def build_law(data: Tables, where: str, files: Files) -> jl.Law:
         require_rock({"mu": law.tables.asperities.mu}, f"{where}.asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{where}.")
     return law
+
+
+def _about_of(path: Path) -> About:
+    """Origin and caveats in a parameter file; empty for the name of a preset."""
+    if not path.is_file():
+        return About()
+    table = tomllib.loads(path.read_text(encoding="utf-8")).get(ABOUT_TABLE, {})
+    return About.from_table(table, str(path))
+
+
+def law_warnings(files: Files) -> list[str]:
+    """Warnings in the parameter files of laws among the files of a scene, each with its file."""
+    warnings = []
+    for name, text in files.items():
+        if f"[{ABOUT_TABLE}]" in text:
+            about = About.from_table(tomllib.loads(text).get(ABOUT_TABLE, {}), name)
+            warnings += [f"{name}: {warning}" for warning in about.warnings]
+    return warnings
 
 
 def intact_rock_law(laws: Iterable[jl.Law], opening: float) -> jl.CoulombLaw:

@@ -1,22 +1,26 @@
 """Parts shared by the subcommands of `jointlaw`: help with an example, options, results."""
 
 import argparse
+import hashlib
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import presets
 from ..laws.joint_law import JointLaw
 from ..parameters import keys
+from ..parameters.about import ABOUT_TABLE, About
 from ..parameters.aperture import APERTURE_TABLE, Aperture
 from ..parameters.resolution import NAMED_RESOLUTIONS
 from ..parameters.rock import ROCK, require_rock
 from ..support import units
 from ..support.files import SUMMARY, clear_run, replace_file, write_json
 from ..support.pyplot import FORMATS
+from ..support.version import __version__
 
 SUMMARY_VERSION = 2
 _ROCK_CONTACTS = {name: getattr(ROCK, name) for name in ("K", "lam", "eta", "mu")}
@@ -124,6 +128,54 @@ def read_aperture(name_or_file: str) -> Aperture | None:
         return None
     table = keys.read(path, "law file").get(APERTURE_TABLE)
     return None if table is None else Aperture.from_table(table, str(path))
+
+
+def read_about(options: argparse.Namespace) -> About:
+    """Origin and caveats of the law that the options `LAW` name, its warnings printed to stderr.
+
+    With --default-rock a warning says that the contacts of a file without [asperity] are assumed.
+    """
+    path = Path(options.law)
+    if options.law in presets.names() or not path.is_file():
+        return About(presets.about(options.law)) if options.law in presets.names() else About()
+    tables = keys.read(path, "law file")
+    about = About.from_table(tables.get(ABOUT_TABLE, {}), str(path))
+    if options.default_rock and "asperity" not in tables and tables.get("kind") != "coulomb":
+        assumed = dict.fromkeys(_ROCK_CONTACTS, "assumed: default rock")
+        text = f"contacts are assumed, those of a default rock ({DEFAULT_ROCK})"
+        about = replace(about, warnings=(*about.warnings, text), origin={**about.origin, **assumed})
+    print_warnings(about, options.law)
+    return about
+
+
+def print_warnings(about: About, name: str) -> None:
+    """Print the warnings of a law to stderr, so that --json leaves stdout to scripts."""
+    for text in about.warnings:
+        print(f"warning, {name}: {text}", file=sys.stderr)
+
+
+def new_about(
+    options: argparse.Namespace,
+    files: Iterable[str | Path],
+    warnings: Iterable[str],
+    origin: Mapping[str, str],
+) -> About:
+    """Origin of a law that this command makes: command, version, date, hashes of input files."""
+    paths = [Path(file) for file in files]
+    digests = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in paths if path.is_file()
+    }
+    notes = {
+        "command": options.words,
+        "version": f"jointlaw {__version__}",
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    return About(notes, tuple(warnings), dict(origin), digests)
+
+
+def law_text(law: Any, about: About) -> str:
+    """TOML text of a law with its table [about]."""
+    return "\n".join(text for text in (law.to_toml(), about.to_toml()) if text)
 
 
 def _read_law_file(path: Path, default_rock: bool) -> Any:

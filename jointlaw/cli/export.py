@@ -10,11 +10,22 @@ from ..hosts import HOSTS, ExportOption, Host
 from ..hosts.c.export import identifier
 from ..parameters.aperture import Aperture
 from ..support.files import clear_run
-from .command import LAW, OUT, Command, Option, option, quantity, read_aperture, read_law
+from .command import (
+    LAW,
+    OUT,
+    Command,
+    Option,
+    option,
+    quantity,
+    read_about,
+    read_aperture,
+    read_law,
+)
 
 
 def _run(options: argparse.Namespace) -> None:
     law = read_law(options)
+    read_about(options)  # prints the warnings of the law
     aperture = read_aperture(options.law)
     host = HOSTS[options.host]
     with TemporaryDirectory() as complete:  # a law that is refused leaves the folder unchanged

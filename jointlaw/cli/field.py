@@ -4,10 +4,34 @@ import argparse
 import math
 
 from ..calibration.field import ASSUMED, from_field, peak_displacement, shear_past_peak
-from .command import JSON, OUT, PICTURE_FORMAT, Command, Contents, option, quantity, write_results
+from .command import (
+    JSON,
+    OUT,
+    PICTURE_FORMAT,
+    Command,
+    Contents,
+    law_text,
+    new_about,
+    option,
+    quantity,
+    write_results,
+)
 
 FIELD_VALUES = ("jrc", "jcs", "length", "normal_stress", "normal_stiffness", "basic_friction")
 _STRESS = quantity("Pa", positive=True)
+VALID_NEAR = (
+    "from field values: valid near a normal stress of {:.4g} MPa; for other stresses fit a closure "
+    "and a shear test (jointlaw fit)"
+)
+ORIGIN = {
+    "mu": "from the basic friction angle",
+    "a": "from JRC and JCS, by the peak friction angle",
+    "asperity_density": "from the normal stiffness",
+    "mating_length": "from Barton's peak displacement",
+    "slope_wear": "assumed: over 1.25 mating lengths",
+    **dict.fromkeys(("K", "lam", "eta", "alpha", "beta", "overlap"), "assumed"),
+    **dict.fromkeys(("b", "c"), "assumed: no dependence on direction"),
+}
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -32,8 +56,13 @@ def _run(options: argparse.Namespace) -> None:
         f"{law.asperity_density:.3g} per m2, mating_length = {law.mating_length:.3g} m.\n\n"
         f"{ASSUMED}\n"
     )
-    files: Contents = {"law.toml": law.to_toml, "report.md": text, "shear.png": test.record.plot}
-    summary = {"given_SI": values, "result": test.record.summary()}
+    about = new_about(options, (), (VALID_NEAR.format(options.normal_stress / 1e6),), ORIGIN)
+    files: Contents = {
+        "law.toml": law_text(law, about),
+        "report.md": text,
+        "shear.png": test.record.plot,
+    }
+    summary = {"given_SI": values, "result": test.record.summary(), "warnings": about.warnings}
     write_results(options, files, summary, text)
 
 

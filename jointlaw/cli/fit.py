@@ -1,10 +1,8 @@
 """`jointlaw fit`: one law for measured closure and shear tests, with report and picture."""
 
 import argparse
-import hashlib
 import math
-from collections.abc import Sequence
-from datetime import UTC, datetime
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import compress
 from pathlib import Path
@@ -25,11 +23,11 @@ from ..calibration.envelopes import (
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.meaning import spacing
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
+from ..parameters.about import About
 from ..parameters.rock import require_rock
 from ..support.checks import Array
 from ..support.markdown import table
 from ..support.text_numbers import DECIMAL_MARKS
-from ..support.version import __version__
 from .command import (
     JSON,
     OUT,
@@ -37,6 +35,8 @@ from .command import (
     Command,
     Contents,
     Group,
+    law_text,
+    new_about,
     option,
     quantities,
     quantity,
@@ -96,7 +96,9 @@ def _run(options: argparse.Namespace) -> None:
     fitted, predicted = _split_shear_tests(_read_shear_tests(options), options.fit)
     fit = fit_curves([*closure_curves, *fitted], **parameters)
     comparisons = fit.comparisons(predicted, held_out)
-    provenance = _provenance(options, [*closure_curves, *fitted, *predicted])
+    inputs = [*options.data, *options.shear, options.peaks, options.flow]
+    about = new_about(options, filter(None, inputs), _warnings(fit), _origin(fit, options))
+    provenance = _provenance(about, [*closure_curves, *fitted, *predicted])
     shear_files = [*options.shear, *([options.peaks] if options.peaks else [])]
     name = ", ".join(Path(file).name for file in [*options.data, *shear_files])
     require_rock(fit.parameters, f"{name}: the fitted ")
@@ -113,6 +115,7 @@ def _run(options: argparse.Namespace) -> None:
         "spacing_of_asperities_m": spacing(fit.law),
         "points_in_band": count_within([one for one in comparisons if one.is_fitted]),
         "provenance": provenance,
+        "warnings": about.warnings,
     }
     if held_out is not None:
         error = fit.predict(held_out.closure) / held_out.stress - 1
@@ -123,17 +126,46 @@ def _run(options: argparse.Namespace) -> None:
     files: Contents = {
         "points.csv": to_csv(comparisons),
         "fit.png": partial(fit.plot, held_out=held_out, predicted=predicted),
-        "law.toml": fit.law.to_toml,
+        "law.toml": law_text(fit.law, about),
     }
     if options.flow:
         flow_fit = _fit_flow(options, fit)
         text += flow_fit.report()
         summary |= flow_fit.summary()
-        law_text = f"{fit.law.to_toml()}\n{flow_fit.aperture.to_toml()}"
-        files = {**files, "law.toml": law_text, "flow.png": flow_fit.plot}
+        with_aperture = f"{law_text(fit.law, about)}\n{flow_fit.aperture.to_toml()}"
+        files = {**files, "law.toml": with_aperture, "flow.png": flow_fit.plot}
     text += _report_provenance(provenance)
     files = {**files, "report.md": text}
     write_results(options, files, summary, text)
+
+
+def _warnings(fit: Fit) -> Iterator[str]:
+    """Yield what a user of the fitted law has to know: shape, parameters, missing openings."""
+    stresses = [float(np.max(curve.normal)) for curve in fit.problem.shears]
+    if fit.problem.closure is not None:
+        stresses.append(float(np.max(fit.problem.closure.stress)))
+    yield f"fitted to normal stresses up to {max(stresses) / 1e6:.4g} MPa"
+    if any(fit.shape_differs):
+        names = "; ".join(compress(fit.series_names, fit.shape_differs))
+        yield f"{names} has another shape than the law: its intervals are too narrow"
+    for name, reason in fit.not_identifiable.items():
+        yield f"{name} is not identifiable from the data: {reason}"
+    if fit.has_trade_off:
+        yield "no opening was measured: less friction and more dilation give the same shear stress"
+
+
+def _origin(fit: Fit, options: argparse.Namespace) -> dict[str, str]:
+    """Origin of each parameter: fitted with its interval, given, or that of the initial law."""
+    given = {item.partition("=")[0].strip() for item in options.set}
+    initial = f"of the law {options.law}" if options.law else "assumed: default rock"
+    origin = {}
+    for name in fit.parameters:
+        if name in fit.free:
+            low, high = fit.interval(name)
+            origin[name] = f"fitted, 95 % interval {low:.4g} to {high:.4g}"
+        else:
+            origin[name] = "given (--set)" if name in given else initial
+    return origin
 
 
 def _specimen_size(options: argparse.Namespace) -> float | None:
@@ -142,19 +174,10 @@ def _specimen_size(options: argparse.Namespace) -> float | None:
     return options.side or (math.sqrt(area) if area else None)
 
 
-def _provenance(
-    options: argparse.Namespace, curves: Sequence[ClosureCurve | ShearCurve]
-) -> dict[str, Any]:
-    """Version, command, date, hashes of the files, and the columns that were read."""
-    paths = [*options.data, *options.shear, options.peaks, options.flow]
-    files = [Path(path) for path in paths if path and Path(path).is_file()]
-    return {
-        "version": __version__,
-        "command": options.words,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "sha256": {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files},
-        "columns": {curve.name: curve.source for curve in curves if curve.source},
-    }
+def _provenance(about: About, curves: Sequence[ClosureCurve | ShearCurve]) -> dict[str, Any]:
+    """Command, version, date, hashes of the files, and the columns that were read."""
+    columns = {curve.name: curve.source for curve in curves if curve.source}
+    return {**about.notes, "sha256": dict(about.sha256), "columns": columns}
 
 
 def _report_provenance(provenance: dict[str, Any]) -> str:
@@ -163,7 +186,7 @@ def _report_provenance(provenance: dict[str, Any]) -> str:
         "",
         "## Provenance",
         "",
-        f"jointlaw {provenance['version']}, {provenance['date']}:",
+        f"{provenance['version']}, {provenance['date']}:",
         "",
         f"    {provenance['command']}",
         "",

@@ -21,9 +21,11 @@ from .command import (
     Command,
     Contents,
     Group,
+    law_text,
     option,
     quantities,
     quantity,
+    read_about,
     read_law,
     settings,
     write_results,
@@ -101,15 +103,17 @@ def _run_test(
 def _write(record: TestRecord, text: str, law: JointLaw, options: argparse.Namespace) -> None:
     """Write curve (CSV), picture, law and summary of a test."""
     length, stress = options.units.split(",")
+    about = read_about(options)
     files: Contents = {
         f"{options.command}.csv": partial(record.to_csv, length=length, stress=stress),
-        "law.toml": law.to_toml,
+        "law.toml": law_text(law, about),
         f"{options.command}.png": record.plot,
     }
     summary: dict[str, Any] = {
         "settings_SI": settings(options),
         "result": record.summary(),
         "units": UNITS,
+        "warnings": about.warnings,
     }
     write_results(options, files, summary, text)
 

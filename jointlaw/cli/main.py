@@ -11,12 +11,13 @@ from ..laboratory.experiments import PathError
 from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
-from . import browser, export, field, fit, laboratory, presets, scan
+from . import browser, card, export, field, fit, laboratory, presets, scan
 from .command import Command, Group
 
 COMMANDS = (
     browser.COMMAND,
     presets.COMMAND,
+    card.COMMAND,
     laboratory.CLOSURE,
     laboratory.SHEAR,
     fit.COMMAND,

@@ -1,19 +1,35 @@
 """`jointlaw scan`: orientation and heights of asperities from a scanned surface."""
 
 import argparse
+import io
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..laboratory.experiments import direct_shear
 from ..parameters.rock import ROCK, require_rock
 from ..parameters.toml import VERSION
 from ..support.checks import Array
+from ..support.files import replace_file
 from ..support.markdown import table
 from ..support.text_numbers import DECIMAL_MARKS
+from ..surface.faces import MIRRORS, join_faces
 from ..surface.fit import SAMPLES, SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import DEFAULT_ROCK, JSON, OUT, Command, Contents, option, quantity, write_results
+from .command import (
+    DEFAULT_ROCK,
+    JSON,
+    OUT,
+    PICTURE_FORMAT,
+    Command,
+    Contents,
+    option,
+    quantity,
+    write_results,
+)
 
 REPORT_STRESS = 1e6  # Pa, normal stress of the friction angles in the report
 SAMPLING_LENGTH_RATIO = 2  # second sampling length of the report over the first
@@ -22,9 +38,19 @@ SAMPLING_LENGTH_RATIO = 2  # second sampling length of the report over the first
 def _run(options: argparse.Namespace) -> None:
     name = Path(options.file).name
     z = read_scan(options.file, options.height_unit, options.spacing, options.decimal)
+    if options.mirror and not options.upper:
+        raise ValueError("--mirror is about two faces: name the upper one after --upper")
+    faces = None
+    if options.upper:
+        upper = read_scan(options.upper, options.height_unit, options.spacing, options.decimal)
+        faces = join_faces(z, upper, options.spacing, options.mirror)
+        z = faces.z
+        name += f" and {Path(options.upper).name}"
     fit = from_surface(z, options.spacing, options.sampling_length)
     require_rock(fit.parameters, f"{name}: the fitted ")
     text = fit.report() + _report_friction(fit, z)
+    if faces is not None:
+        text += f"\n{faces.describe()}\n"
     summary: dict[str, Any] = {
         "parameters_SI": fit.parameters,
         "standard_error_SI": {
@@ -33,7 +59,19 @@ def _run(options: argparse.Namespace) -> None:
         "sampling_length_m": fit.asperities.size,
         "not_identifiable": fit.not_identifiable,
     }
-    files: Contents = {"surface.toml": _surface_toml(fit, name), "report.md": text}
+    files: Contents = {
+        "surface.toml": _surface_toml(fit, name),
+        "report.md": text,
+        "scan.png": fit.plot,
+    }
+    if faces is not None:
+        summary["faces"] = {
+            "mirror": faces.mirror,
+            "shift_m": faces.shift,
+            "rotation_rad": faces.rotation,
+            "correlation": faces.correlation,
+        }
+        files = {**files, "composite.npy": partial(_save_heights, z=z)}
     write_results(options, files, summary, text)
 
 
@@ -86,6 +124,13 @@ def _surface_toml(fit: SurfaceFit, name: str) -> str:
     )
 
 
+def _save_heights(path: Path, z: Array) -> None:
+    """Write heights in m as an NPY file."""
+    buffer = io.BytesIO()
+    np.save(buffer, z)
+    replace_file(path, buffer.getvalue())
+
+
 COMMAND = Command(
     "scan",
     "estimate heights, orientations and density of asperities from a scanned composite surface",
@@ -95,7 +140,19 @@ COMMAND = Command(
         option(
             "file",
             metavar="FILE",
-            help="matrix of heights, or list of x, y, z, as text, ASC or NPY",
+            help="matrix of heights of the composite surface, or list of x, y, z, as text, ASC or "
+            "NPY; with --upper, of the lower face",
+        ),
+        option(
+            "--upper",
+            metavar="FILE",
+            help="the other face of the joint, scanned likewise from outside its block: it is "
+            "turned over and aligned with FILE, and both are added",
+        ),
+        option(
+            "--mirror",
+            choices=tuple(MIRRORS),
+            help="how the grid of the upper face is turned over (default: the way that fits best)",
         ),
         option(
             "--spacing",
@@ -124,5 +181,6 @@ COMMAND = Command(
         ),
         *OUT,
         JSON,
+        PICTURE_FORMAT,
     ),
 )

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..support.checks import Array, finite, more_than, numbers
 from ..support.markdown import table
 from .asperities import MeasuredAsperities, extract_asperities, remove_mean_plane
 from .densities import HEIGHT_PARAMETERS, Estimate, fit_directions, fit_heights
+from .picture import plot_surface
 from .roughness import find_spikes, measured_slopes, rms_slope
 
 SAMPLES = 4  # points along the edge of a facet, by default
@@ -36,6 +38,7 @@ class SurfaceFit:
     spacing: spacing of the points in m.
     slopes: rms slopes (Z2) of the whole surface along the rows and across them.
     spikes: grid indices (n, 2) of points that are probably measurement errors.
+    heights_of_scan: heights (ny, nx) in m about their mean plane.
     """
 
     estimates: dict[str, Estimate]
@@ -43,6 +46,7 @@ class SurfaceFit:
     spacing: float
     slopes: tuple[float, float]
     spikes: NDArray[np.intp]
+    heights_of_scan: Array
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -101,6 +105,14 @@ class SurfaceFit:
         return JointLaw(
             orientation=self.orientation, asperity=asperity, heights=self.heights, **options
         )
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Plot the surface with its summits, inclinations by direction, and depths of summits.
+
+        path: file to save the figure to, or None. Returns the figure. Needs matplotlib (extra
+        `plot`).
+        """
+        return plot_surface(self, path)
 
     def report(self) -> str:
         """The result in sentences and tables (Markdown)."""
@@ -206,7 +218,7 @@ def from_surface(z: ArrayLike, spacing: float, sampling_length: float | None = N
     estimates["asperity_density"] = Estimate(
         density, error, density - 1.96 * error, density + 1.96 * error
     )
-    return SurfaceFit(estimates, asperities, spacing, slopes, find_spikes(level))
+    return SurfaceFit(estimates, asperities, spacing, slopes, find_spikes(level), level)
 
 
 def _points_per_facet(sampling_length: float | None, spacing: float) -> int:

@@ -28,6 +28,7 @@ from jointlaw.hosts import HOSTS
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SHEAR = "--to 1um --steps 3"
 SCAN = "scan scan.csv --spacing 20um --height-unit um"
+FACES = SCAN + " --upper upper.csv"
 FIELD = {
     "jrc": ("10", "11"),
     "jcs": ("100MPa", "90MPa"),
@@ -113,6 +114,8 @@ PROBES = {
         "--height-unit": (SCAN, SCAN.replace("unit um", "unit nm")),
         "--decimal": (SCAN.replace("scan.csv", "comma.csv"), "--decimal comma"),
         "--sampling-length": (SCAN, "--sampling-length 100um"),
+        "--upper": (FACES, FACES.replace("upper.csv", "upper2.csv")),
+        "--mirror": (FACES, "--mirror columns"),
     },
     "field": {
         **{
@@ -295,6 +298,8 @@ def rows(*columns):
 
 RAMP = np.linspace(0.1, 1.0, 12)
 SIZE = gaussian_filter(np.random.default_rng(0).normal(size=(120, 120)), 4) * 400
+# alike if it is reversed along columns, so that both ways to turn it over give a composite surface
+UPPER_FACE = -0.3 * (SIZE + SIZE[::-1, ::-1])
 SHEAR_TITLES = "shear_mm,shear_stress_MPa,normal_stress_MPa,opening_mm,second,other,third\n"
 
 
@@ -329,6 +334,8 @@ FILE_TEXTS = {
     + rows(5 * RAMP**2, np.where(np.arange(12) == 6, 0.9, 0.01 * RAMP)),
     "scan.csv": rows(*SIZE),
     "scan2.csv": rows(*(1.5 * SIZE)),
+    "upper.csv": rows(*(UPPER_FACE[:, ::-1])),
+    "upper2.csv": rows(*(1.2 * UPPER_FACE[:, ::-1])),
     "comma.csv": "".join(";".join(row) + "\n" for row in AMBIGUOUS),
     "surface.toml": "asperity_density = 1e10\nclosure_range = 1e-6\n[orientation]\na = 3.0\n",
     "scene.toml": SCENE,

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 import jointlaw as jl
+from jointlaw.surface.faces import MIRRORS, join_faces
 from jointlaw.surface.roughness import measured_slopes, rms_slope
 from jointlaw.surface.scan_files import read_scan
 
@@ -164,6 +166,95 @@ def test_spikes_are_counted_and_cliffs_are_not(surface):
     fit = jl.from_surface(z, SPACING)
     assert {tuple(one) for one in fit.spikes} == {tuple(one) for one in spikes}
     assert "Warning: 30 points are spikes" in fit.report()
+
+
+def faces_of_a_joint(mirror, shift=(3.3, -5.6), rotation=0.004):
+    """Lower and upper face (160, 160) in m of a joint, and its composite surface.
+
+    The upper face is measured in a frame of its own, turned over.
+
+    shift: of this frame in points. rotation: of this frame in rad.
+    """
+    rng = np.random.default_rng(3)
+
+    def smooth(points):
+        z = ndimage.gaussian_filter(rng.standard_normal((160, 160)), points, mode="wrap")
+        return z / np.std(z)
+
+    lower = 2e-4 * smooth(8)
+    composite = 1e-5 * smooth(2.5)
+    y, x = np.mgrid[:160, :160] - 79.5
+    cosine, sine = np.cos(rotation), np.sin(rotation)
+    where = [
+        cosine * y - sine * x + 79.5 + shift[0],
+        cosine * x + sine * y + 79.5 + shift[1],
+    ]
+    upper = ndimage.map_coordinates(composite - lower, where, order=3, mode="grid-wrap")
+    return lower, np.flip(upper, MIRRORS[mirror]), composite
+
+
+@pytest.mark.parametrize("mirror", MIRRORS)
+def test_two_faces_give_the_composite_surface(mirror):
+    """Turned over, shifted by fractions of a point and rotated: heights of 10 um from 200 um."""
+    lower, upper, composite = faces_of_a_joint(mirror)
+    joined = join_faces(lower, upper, SPACING)
+    assert joined.mirror == mirror
+    # 0.1 points: the composite surface itself is correlated with the slopes of the faces
+    np.testing.assert_allclose(joined.shift, SPACING * np.array([3.3, -5.6]), atol=0.1 * SPACING)
+    assert joined.rotation == pytest.approx(0.004, abs=1e-3)
+    rows, columns = joined.z.shape
+    # the common area, without a rim that rotation may turn out of a face
+    assert min(rows, columns) > 140
+    offsets = [
+        composite[i : i + rows, j : j + columns]
+        for i in range(161 - rows)
+        for j in range(161 - columns)
+    ]
+    correlation = max(np.corrcoef(joined.z.ravel(), one.ravel())[0, 1] for one in offsets)
+    assert correlation > 0.97
+    assert np.std(joined.z) == pytest.approx(np.std(composite), rel=0.1)
+    fixed = join_faces(lower, upper, SPACING, mirror)
+    np.testing.assert_array_equal(fixed.z, joined.z)
+
+
+def test_faces_of_other_joints_are_refused():
+    lower, upper, _ = faces_of_a_joint("rows")
+    with pytest.raises(ValueError, match=r"correlation with the lower face is .*change the sign"):
+        join_faces(lower, -upper, SPACING)
+    with pytest.raises(ValueError, match=r"mirror.*'up'"):
+        join_faces(lower, upper, SPACING, "up")
+    upper[3, 4] = np.nan
+    with pytest.raises(ValueError, match="upper"):
+        join_faces(lower, upper, SPACING)
+
+
+def test_picture_of_a_scan(surface, tmp_path):
+    fit = jl.from_surface(surface, SPACING)
+    hillshade, inclinations, depths, _ = sorted(
+        fit.plot().axes, key=lambda axis: axis.get_position().x0 + 2 * (axis.get_label() != "")
+    )
+    summits = next(line for line in hillshade.lines if "summits" in line.get_label())
+    rows, columns = fit.asperities.grid_indices.T
+    np.testing.assert_allclose(summits.get_xdata(), 1e3 * SPACING * (columns + 0.5))
+    np.testing.assert_allclose(summits.get_ydata(), 1e3 * SPACING * (rows + 0.5))
+    assert f"{rows.size} summits" in summits.get_label()
+    lines = {line.get_label(): line.get_xydata() for line in inclinations.lines}
+    _, inclination = lines["facets"].T
+    assert 0 < inclination.min() < inclination.max() < 1.2 * 90 / fit.orientation.a
+    azimuth, measured = lines["rms slope of the facets"].T
+    # along the rows and across them; the facets of the summits are a part of the surface, which
+    # has steps between its squares too
+    for angle, slope in zip((0.0, np.pi / 2), fit.slopes, strict=True):
+        found = np.tan(np.radians(np.interp(angle, azimuth, measured)))
+        assert found == pytest.approx(slope, rel=0.25)
+    _, law = lines["rms slope of the law"].T
+    assert law[0] == pytest.approx(np.degrees(np.arctan(rms_slope(fit.orientation))))
+    (density,) = depths.lines
+    x, y = density.get_xydata().T
+    assert 0.9 < np.trapezoid(y, x) <= 1.0
+    path = tmp_path / "scan.png"
+    fit.plot(path)
+    assert path.read_bytes().startswith(b"\x89PNG")
 
 
 def text_files(z):

@@ -223,34 +223,30 @@ INLINE double apply_joint(const dem_step *sim, long long i, double *total, doubl
   const double *row = sim->kinematics + 2 * dim * dof * i;
   const double *area_gradient = sim->area_gradient + 2 * dof * i;
   const double *rates = sim->rates + dim * i;
-  double joint[MAX_DIM], dashpot[MAX_DIM];
+  double joint[MAX_DIM], dashpot[MAX_DIM] = {0.0};
   for (int c = 0; c < dim; c++) joint[c] = area * sim->traction[dim * i + c];
-  for (int j = 0; j < dof; j++) {
-    double on_a = 0.0, on_b = 0.0;
-    for (int c = 0; c < dim; c++) {
-      on_a += joint[c] * row[2 * dof * c + j];
-      on_b += joint[c] * row[2 * dof * c + dof + j];
-    }
-    total[dof * a + j] -= on_a + energy * area_gradient[j];
-    total[dof * b + j] -= on_b + energy * area_gradient[dof + j];
-  }
-  /* 2 sqrt(stiffness * reduced mass), with half a joint for each block */
   const double inverse_mass = sim->inverse_mass[a] + sim->inverse_mass[b];
-  if (!(inverse_mass > 0.0) || !(stiffness > 0.0)) return stiffness;
-  const double critical = 2.0 * sqrt(stiffness * (0.5 / inverse_mass));
-  dashpot[0] = sim->dashpot_normal * critical * rates[0];
-  if (!(damage < 1.0)) dashpot[0] = larger(dashpot[0], -joint[0]); /* only a bond pulls */
-  const double stick = larger(
-      1.0 - sim->measures[DEM_SEPARATED * k + i] - sim->measures[DEM_SLIPPING * k + i], 1.0 - damage);
-  for (int c = 1; c < dim; c++) dashpot[c] = sim->dashpot_shear * critical * stick * rates[c];
-  for (int j = 0; j < dof; j++) {
-    double on_a = 0.0, on_b = 0.0;
-    for (int c = 0; c < dim; c++) {
-      on_a += dashpot[c] * row[2 * dof * c + j];
-      on_b += dashpot[c] * row[2 * dof * c + dof + j];
+  if (inverse_mass > 0.0 && stiffness > 0.0) {
+    /* 2 sqrt(stiffness * reduced mass), with half a joint for each block */
+    const double critical = 2.0 * sqrt(stiffness * (0.5 / inverse_mass));
+    dashpot[0] = sim->dashpot_normal * critical * rates[0];
+    if (!(damage < 1.0)) dashpot[0] = larger(dashpot[0], -joint[0]); /* only a bond pulls */
+    const double stick =
+        larger(1.0 - sim->measures[DEM_SEPARATED * k + i] - sim->measures[DEM_SLIPPING * k + i],
+               1.0 - damage);
+    for (int c = 1; c < dim; c++) dashpot[c] = sim->dashpot_shear * critical * stick * rates[c];
+  }
+  for (int side = 0; side < 2; side++, row += dof, area_gradient += dof) {
+    const long long at = dof * (side ? b : a);
+    for (int j = 0; j < dof; j++) {
+      double of_joint = 0.0, of_dashpot = 0.0;
+      for (int c = 0; c < dim; c++) {
+        of_joint += joint[c] * row[2 * dof * c + j];
+        of_dashpot += dashpot[c] * row[2 * dof * c + j];
+      }
+      total[at + j] -= of_joint + energy * area_gradient[j];
+      damped[at + j] -= of_dashpot;
     }
-    damped[dof * a + j] -= on_a;
-    damped[dof * b + j] -= on_b;
   }
   return stiffness;
 }

@@ -287,6 +287,7 @@ def _check(options: argparse.Namespace) -> None:
     if sim.verdict:
         _print_limit_analysis(sim.scene)
         _check_stages(sim.scene)
+        _check_water_tables(sim.scene)
     for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows_by_law, strict=True):
         stress = float(sim.joints.traction[rows, 0].max(initial=0.0))
         if isinstance(law, JointLaw):
@@ -316,6 +317,16 @@ def _check_stages(scene: Scene) -> None:
             continue
         _print_verdict(sim)
         _print_limit_analysis(excavated)
+
+
+def _check_water_tables(scene: Scene) -> None:
+    """Print the verdict on the equilibrium with each later water table, after all stages."""
+    excavated = replace(scene.excavated, water=scene.water, water_changes=scene.water_changes)
+    for start, _ in scene.water_changes:
+        print(f"with the water table of {start:g} s, on joints without history:")
+        changed = excavated.with_water_at(start)
+        _print_verdict(Simulation(strength.settled(changed)))
+        _print_limit_analysis(changed)
 
 
 def _warn_of_closure_range(name: str, law: JointLaw, largest: float) -> None:

@@ -133,14 +133,17 @@ class Blocks:
         )
 
 
-def apply_loads(scene: Scene, blocks: Blocks, manager: ContactManager) -> np.ndarray:
-    """Update the loads of the blocks for the present places of their edges; their change (n, 3).
+def apply_loads(
+    scene: Scene, blocks: Blocks, manager: ContactManager, time: float = 0.0
+) -> np.ndarray:
+    """Update the loads of the blocks for the present places of their edges, and the water table of
+    a time (s); their change (n, 3).
 
     Water acts on all edges, so the joints carry the rest, the effective stress. The water pressure
     of the joints of a law acts on both faces where edges lie on each other; being uniform, it is
     the same as half of it at either end of the overlap.
     """
-    stresses = [stress for stress in (scene.water, scene.in_situ) if stress]
+    stresses = [stress for stress in (scene.water_at(time), scene.in_situ) if stress]
     pressures = scene.face_pressures
     if not (stresses or scene.wet or scene.stages or pressures):
         return 0.0 * blocks.loads

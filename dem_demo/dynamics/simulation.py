@@ -42,7 +42,7 @@ RESTING_ACCELERATION = 0.1  # m/s2
 RESTING_FRACTION = 0.9  # of the blocks that must be at rest for the next stage
 FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
     "blocks fall or have no equilibrium": 0.15,
-    "drives move blocks": 0.4,
+    "drives move blocks or the water table changes": 0.4,
     "the blocks are in equilibrium": 0.7,
 }
 IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
@@ -70,6 +70,7 @@ STATE = (
     "steps_since_change",
     "dt",
     "halvings_left",
+    "water_time",
     "limit.current",
     "limit.lowest",
     "limit.lowest_bound",
@@ -121,6 +122,7 @@ class Simulation:
         is_step_given = step or scene.run.step or scene.run.fraction
         self.halvings_left = 0 if is_step_given else MAX_HALVINGS
         self.stage_start_times = np.full(len(scene.stages), np.inf)
+        self.water_time = 0.0  # s: of the water table in the present loads
         if saved:
             self._restore(saved, step)
         else:
@@ -142,7 +144,7 @@ class Simulation:
         """Advance by one time step.
 
         1. Blocks move; their contacts are updated, and searched again where blocks have moved far.
-           An excavation removes blocks, or releases their support.
+           An excavation removes blocks, or releases their support; the water table changes.
         2. The joints take a step: closure from the geometry, sliding from velocity times step.
         3. Tractions, dashpots, weight, loads and drives give forces, energies, new velocities.
         4. The time step is checked if a joint has stiffened; drives are reversed when due.
@@ -152,6 +154,8 @@ class Simulation:
         self._move_blocks()
         if self.scene.stages:
             self._excavate()
+        if self.scene.water_changes and self.steps_since_change % CHECK_INTERVAL == 0:
+            self._change_water_table()
         if self.arrays.transferred or self.arrays.rebuild:
             self._update_contact_list()
         if self.arrays.too_deep >= 0:
@@ -223,7 +227,7 @@ class Simulation:
         """Reduce the support linearly, to zero at the end of the time left (s)."""
         remaining = max(time_left, 0.0) / max(time_left + self.dt, self.dt)
         self.blocks.support *= remaining
-        change = apply_loads(self.scene, self.blocks, self.manager)
+        change = apply_loads(self.scene, self.blocks, self.manager, self.water_time)
         self.energy_balance.change_loads(self.blocks, change, self.dt)
 
     def _is_at_rest(self) -> bool:
@@ -235,6 +239,14 @@ class Simulation:
         motion = np.maximum(speed / RESTING_SPEED, acceleration / RESTING_ACCELERATION)
         is_resting = np.quantile(motion[blocks.is_mobile[:, 0]], RESTING_FRACTION) < 1
         return not blocks.support.any() and bool(is_resting)
+
+    def _change_water_table(self) -> None:
+        """Load the blocks by the water table of the present time, unless it is the last one."""
+        time = min(self.time, self.scene.water_changes[-1][0])
+        if time > self.water_time:
+            self.water_time = time
+            change = apply_loads(self.scene, self.blocks, self.manager, time)
+            self.energy_balance.change_loads(self.blocks, change, self.dt)
 
     # ------------------------------------------------------------------ the time step
 
@@ -287,7 +299,7 @@ class Simulation:
         if scene.run.fraction:
             return scene.run.fraction * limit
         can_fall = not scene.run.settle or self.unstable.any() or self.blocks.velocity.any()
-        is_driven = any(len(drive.times) > 1 for drive in scene.drives)
+        is_driven = scene.water_changes or any(len(drive.times) > 1 for drive in scene.drives)
         falling, driven, resting = FRACTIONS_OF_LIMIT
         if can_fall:
             self.fraction_reason = falling
@@ -404,7 +416,7 @@ class Simulation:
         joints.rearrange(old_row, manager.law, manager.edge_pairs, started=True)
         balance.booked_dissipation = joints.dissipated_energy.copy()
         self.bind()
-        change = apply_loads(self.scene, blocks, manager)
+        change = apply_loads(self.scene, blocks, manager, self.water_time)
         balance.change_loads(blocks, change, self.dt)
         return old_row < 0
 
@@ -432,7 +444,8 @@ class Simulation:
         balance = self.energy_balance
         balance.booked_dissipation[rows] = balance.booked_dissipation[sources]
         self.bind()
-        change = apply_loads(self.scene, self.blocks, manager)  # laws have water pressures
+        # laws have water pressures
+        change = apply_loads(self.scene, self.blocks, manager, self.water_time)
         balance.change_loads(self.blocks, change, self.dt)
 
     def _transfer_joints(self) -> None:

@@ -107,6 +107,12 @@ def read_monitors(sim: Simulation) -> dict[str, float]:
         reading = dict(zip(POINT_COLUMNS, motion.tolist(), strict=True))
         reading["displacement_m"] = float(np.hypot(*(motion[:2] - point)))
         groups.append((f"point {i + 1}", reading))
+    for i, ends in enumerate(scene.convergences):
+        drawn = float(np.hypot(*np.subtract(ends[0][1], ends[1][1])))
+        places = [_point_motion(sim, *end)[:2] for end in ends]
+        distance = float(np.hypot(*(places[1] - places[0])))
+        columns = {"distance_m": distance, "convergence_m": drawn - distance}
+        groups.append((f"convergence {i + 1}", columns))
     bolts = sim.blocks.bolts
     elongation = bolts.elongation(sim.blocks.motion)
     for i, columns in enumerate(zip(bolts.tension, elongation, bolts.yielding, strict=True)):

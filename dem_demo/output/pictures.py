@@ -174,8 +174,8 @@ class Pictures:
         axes.quiver(
             *tails.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, width=0.003, zorder=5
         )
-        if record.scene.water:
-            axes.plot(*record.scene.water.line.T, color=WATER_COLOUR, lw=1.5, ls="-.", zorder=4)
+        if water := record.scene.water_at(record.times[i]):
+            axes.plot(*water.line.T, color=WATER_COLOUR, lw=1.5, ls="-.", zorder=4)
         self._draw_joints(axes, i)
         self._draw_bolts(axes, i)
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",

@@ -5,6 +5,7 @@ blocks     convex blocks
 laws       joint laws and Coulomb's law
 drives     prescribed motions
 cutting    an outline cut along joint sets
+point_files  points of outlines and lines from CSV and DXF files
 supports   rock bolts and pressures on faces
 scene      a scene in memory, and the error of a state that it cannot continue from
 read       a scene from its file

@@ -54,6 +54,15 @@ def points(name: str, value: Any) -> list[tuple[float, float]]:
     return [vector(name, point) for point in LIST(name, value)]
 
 
+def pairs_of_points(name: str, value: Any) -> list[list[tuple[float, float]]]:
+    """Require a list of pairs of different points (m)."""
+    pairs = [points(f"{name}[{i}]", pair) for i, pair in enumerate(LIST(name, value))]
+    for i, pair in enumerate(pairs):
+        if len(pair) != 2 or pair[0] == pair[1]:
+            raise ValueError(f"{name}[{i}]: must be two different points [[x, y], [x, y]]")
+    return pairs
+
+
 def _is_flat(ring: np.ndarray) -> bool:
     """Whether corners (k, 2) lie on one line, but for rounding."""
     sizes = np.linalg.svd(ring - ring.mean(axis=0), compute_uv=False)
@@ -134,13 +143,19 @@ SCENE = {
         **dict.fromkeys(("left", "right", "bottom", "top"),
                         partial(one_of, choices=("fixed", "rollers", "loaded"))),
     },
-    "water": {"table!": polyline, "unit_weight": POSITIVE},
+    "water": {
+        "table!": polyline, "unit_weight": POSITIVE,
+        "at": [{"time!": POSITIVE, "table!": polyline}],
+    },
     "bolt": [{
         "from!": vector, "to!": vector, "stiffness!": POSITIVE, "capacity!": POSITIVE,
         "pretension": NOT_NEGATIVE,
     }],
     "pressure": [{"from!": vector, "to!": vector, "value!": NOT_NEGATIVE}],
-    "monitor": {"slip": LIST, "shear": LIST, "points": points, "joints": points},
+    "monitor": {
+        "slip": LIST, "shear": LIST, "points": points, "joints": points,
+        "convergence": pairs_of_points,
+    },
 }  # fmt: skip
 
 

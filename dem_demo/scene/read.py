@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from .cutting import INWARD_CUT, JointSet, cut, estimate_block_count
 from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of
 from .laws import INTACT_ROCK, Files, build_law, intact_rock_law
+from .point_files import fill_in_points
 from .scene import SKIN_PER_MEDIAN_WIDTH, Rock, Run, Scene, Stress
 from .supports import read_bolts, read_pressures
 
@@ -141,6 +143,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         raise ValueError(
             f"{where}: blocks with three coordinates are in space: use dem_demo.space.load"
         )
+    data = fill_in_points(data, files, where)
     top = DEFAULTS | keys.validate_table(data, SCENE, where)
     laws = {
         name: build_law(table, f"{where}: laws.{name}", files)
@@ -171,16 +174,19 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     drives = read_drives(top["drive"], number, blocks, files, where)
     pairs = _pairs(top["joint"], number, blocks, where)
     run = _run(top["run"], blocks)
-    monitors = _monitors(top["monitor"], number, blocks, run.corner_length, f"{where}: monitor")
+    stages = tuple(_stages(top["excavate"], blocks, where))
+    monitors = _monitors(
+        top["monitor"], number, blocks, run.corner_length, stages, f"{where}: monitor"
+    )
     joint_laws = {*edge_laws.values()} - {INTACT_ROCK}
     for law in [default, *pairs.values(), *sorted(joint_laws)]:
         one_of(f"{where}: law", law, tuple(laws))
-    stages = tuple(_stages(top["excavate"], blocks, where))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
         edge_laws, drives, top["gravity"], top["seismic"], top["thickness"], water, in_situ,
         pressure, stages, **monitors,
+        water_changes=_water_changes(top.get("water", {}), where),
         bolts=tuple(read_bolts(top["bolt"], blocks, stages, where)),
         face_pressures=tuple(read_pressures(top["pressure"], blocks, where)),
     )  # fmt: skip
@@ -265,6 +271,15 @@ def _stresses(top: Tables, blocks: list[Block], where: str) -> tuple[Stress | No
     return water, Stress(tensor, line, weight, float(is_uniform), loaded)
 
 
+def _water_changes(table: Tables, where: str) -> tuple[tuple[float, np.ndarray], ...]:
+    """Return times and lines of the later water tables of `[water]`. Raises ValueError."""
+    changes = tuple((part["time"], part["table"]) for part in table.get("at", ()))
+    times = [time for time, _ in changes]
+    if any(later <= earlier for earlier, later in pairwise(times)):
+        raise ValueError(f"{where}: water.at: times {times} s must increase")
+    return changes
+
+
 def _apply_sides(table: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
     """Fix the blocks on the sides of a scene as `[in_situ]` says.
 
@@ -313,11 +328,12 @@ def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) ->
 
 
 def _monitors(
-    table: Tables, number: dict[str, int], blocks: Sequence[Block], reach: float, where: str
-) -> dict[str, tuple[Any, ...]]:
+    table: Tables, number: dict[str, int], blocks: Sequence[Block], reach: float,
+    stages: Sequence[Tables], where: str,
+) -> dict[str, tuple[Any, ...]]:  # fmt: skip
     """Return the fields of a `Scene` that the `[monitor]` table gives.
 
-    reach: largest gap (m) of a monitored joint. Raises ValueError.
+    reach: largest gap (m) of a monitored joint. stages: of excavation. Raises ValueError.
     """
     pairs: dict[str, tuple[Any, ...]] = {}
     for kind in ("slip", "shear"):
@@ -332,7 +348,40 @@ def _monitors(
     point_joints = [
         _joint_at(f"{where}.joints", point, blocks, reach) for point in table.get("joints", ())
     ]
-    return pairs | {"points": tuple(points), "point_joints": tuple(point_joints)}
+    removed = {i for stage in stages for i in stage["blocks"]}
+    convergences = []
+    for i, pair in enumerate(table.get("convergence", ())):
+        name = f"{where}.convergence[{i}]"
+        ends = tuple((_wall_at(name, point, blocks, removed), point) for point in pair)
+        if ends[0][0] == ends[1][0] or not any(blocks[end[0]].moves for end in ends):
+            names = " and ".join(repr(blocks[end[0]].name) for end in ends)
+            raise ValueError(
+                f"{name}: its points lie in {names}; must lie in two blocks, of which one moves"
+            )
+        convergences.append(ends)
+    return pairs | {
+        "points": tuple(points),
+        "point_joints": tuple(point_joints),
+        "convergences": tuple(convergences),
+    }
+
+
+def _wall_at(
+    name: str, point: tuple[float, float], blocks: Sequence[Block], removed: set[int]
+) -> int:
+    """Return the number of the block that a point (m) lies in or on, and that no stage removes.
+
+    Raises ValueError.
+    """
+    extent = max(float(np.ptp(block.corners)) for block in blocks)
+    shapes = {i: Polygon(block.corners) for i, block in enumerate(blocks) if i not in removed}
+    distances = {i: shape.distance(Point(point)) for i, shape in shapes.items()}
+    nearest = min(distances, key=lambda i: (distances[i], not blocks[i].moves))
+    if distances[nearest] > LENGTH_TOLERANCE * extent:
+        raise ValueError(
+            f"{name}: {list(point)} lies in no block that stays; give a point on a wall"
+        )
+    return nearest
 
 
 def _joint_at(

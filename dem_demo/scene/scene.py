@@ -95,14 +95,16 @@ class Scene:
     gravity: acceleration (m/s2). seismic: pseudo-static forces along x and y, as shares of the
     weight of every block; they load blocks only, water and in-situ stress follow from `gravity`.
 
-    water: pore pressure in joints and on faces; in_situ: stress before an excavation; pressure:
+    water: pore pressure in joints and on faces, at time 0; water_changes: later water tables, each
+    a time (s) and a line (m, 2) as in `Stress`; in_situ: stress before an excavation; pressure:
     water pressure (Pa) in the joints of a law, by its name. stages: excavation stages, each with
     its `blocks`, its `start` (s; None: once the rock is at rest) and its `release_time` (s).
     removed: blocks that are absent from the beginning. bolts, face_pressures: rock bolts, and
     pressures on faces of blocks.
 
     slip, shear: monitored joints, as (moving block, base); point_joints: monitored joints nearest
-    to given points, as two blocks; points: history points, as (block, position in m). reduction:
+    to given points, as two blocks; points: history points, as (block, position in m);
+    convergences: pairs of such points. reduction:
     strength reduction factor of all joints (see `Joints`).
 
     text: of the file that the scene was read from, empty for a scene made or changed in memory;
@@ -126,12 +128,14 @@ class Scene:
     pressure: dict[str, float] = field(default_factory=dict)
     stages: tuple[Tables, ...] = ()
     removed: tuple[int, ...] = ()
+    water_changes: tuple[tuple[float, np.ndarray], ...] = ()
     bolts: tuple[Bolt, ...] = ()
     face_pressures: tuple[FacePressure, ...] = ()
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
     point_joints: tuple[tuple[int, int], ...] = ()
     points: tuple[tuple[int, tuple[float, float]], ...] = ()
+    convergences: tuple[tuple[tuple[int, tuple[float, float]], ...], ...] = ()
     reduction: float = 1.0
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
@@ -157,9 +161,32 @@ class Scene:
 
     @property
     def excavated(self) -> "Scene":
-        """The scene after all excavation stages, under the same in-situ stress."""
+        """The scene after all excavation stages, under the same in-situ stress, with its last water
+        table."""
         blocks = [i for stage in self.stages for i in stage["blocks"]]
-        return replace(self, stages=(), removed=(*self.removed, *blocks)) if blocks else self
+        scene = self.with_water_at(np.inf)
+        return replace(scene, stages=(), removed=(*self.removed, *blocks)) if blocks else scene
+
+    def with_water_at(self, time: float) -> "Scene":
+        """The scene with its water table at a time (s) as the only one."""
+        if not self.water_changes:
+            return self
+        return replace(self, water=self.water_at(time), water_changes=())
+
+    def water_at(self, time: float) -> Stress | None:
+        """The pore pressure at a time (s); the water table changes linearly between its times."""
+        if self.water is None or not self.water_changes or time <= 0.0:
+            return self.water
+        times = [0.0, *(time for time, _ in self.water_changes)]
+        lines = [self.water.line, *(line for _, line in self.water_changes)]
+        if time >= times[-1]:
+            return replace(self.water, line=lines[-1])
+        i = int(np.searchsorted(times, time, side="right"))
+        before, after = lines[i - 1 : i + 1]
+        share = (time - times[i - 1]) / (times[i] - times[i - 1])
+        x = np.union1d(before[:, 0], after[:, 0])
+        y = (1.0 - share) * np.interp(x, *before.T) + share * np.interp(x, *after.T)
+        return replace(self.water, line=np.stack([x, y], axis=1))
 
     @property
     def base(self) -> int | None:

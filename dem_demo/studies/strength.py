@@ -28,6 +28,7 @@ from ..output.record import format_blocks, list_blocks
 from ..output.run import run_to_failure
 from ..scene import Scene, Tables, build, median_size, read_tables, rotation
 from ..scene.blocks import LENGTH_TOLERANCE
+from ..scene.point_files import fill_in_points
 from .limit_analysis import limit_factor
 
 TRIALS_VERSION = 4
@@ -354,7 +355,7 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
     seed: another seed than the rock's own. `[[joint]]` tables of this rock are kept; tables
     that name its blocks are kept only with its own seed, because another seed gives other blocks.
     """
-    data = read_tables(scene.text)
+    data = fill_in_points(read_tables(scene.text), scene.files, scene.title)
     rock = next(table for table in data["rock"] if table["name"] == name)
     table = {"seed": 0, **rock} | ({} if seed is None else {"seed": seed})
     has_own_seed = table["seed"] == rock.get("seed", 0)

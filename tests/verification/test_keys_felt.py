@@ -92,6 +92,10 @@ UNIFORM = IN_SITU | {
 }
 del UNIFORM["in_situ"]["k0"], UNIFORM["in_situ"]["surface"]
 WET = BLOCKS | {"gravity": [0.0, -9.81], "water": {"table": [[0.0, 0.4]], "unit_weight": 9810.0}}
+RISING = WET | {
+    "water": {"table": [[0.0, 0.4]], "at": [{"time": 0.005, "table": [[0.0, 0.6]]}]},
+    "run": RUN | {"step": 1e-4},
+}
 JOINTED = BLOCKS | {"joint": [{"between": ["base", "one"], "law": "strong"}]}
 AROUND = BLOCKS | {"joint": [{"around": [0.1, 0.1], "law": "strong"}]}
 MONITORED = BLOCKS | {
@@ -208,6 +212,8 @@ PROBES = {  # path of the key: scene, where the key is in it, another value
     "in_situ.bottom": (IN_SITU, "in_situ.bottom", "rollers"),
     "in_situ.top": (IN_SITU, "in_situ.top", "fixed"),
     "water.table": (WET, "water.table", [[0.0, 0.3]]),
+    "water.at.time": (RISING, "water.at.0.time", 0.01),
+    "water.at.table": (RISING, "water.at.0.table", [[0.0, 0.5]]),
     "water.unit_weight": (WET, "water.unit_weight", 9000.0),
     "bolt.from": (BOLTED, "bolt.0.from", [0.0, 0.6]),
     "bolt.to": (BOLTED, "bolt.0.to", [0.0, -0.4]),
@@ -220,6 +226,11 @@ PROBES = {  # path of the key: scene, where the key is in it, another value
     "monitor.slip": (MONITORED, "monitor.slip", []),
     "monitor.shear": (MONITORED, "monitor.shear", []),
     "monitor.points": (MONITORED, "monitor.points", [[0.2, 0.1]]),
+    "monitor.convergence": (
+        MONITORED | {"monitor": {"convergence": [[[0.1, 0.1], [0.1, -0.1]]]}},
+        "monitor.convergence",
+        [[[0.1, 0.7], [0.1, -0.1]]],
+    ),
     "monitor.joints": (MONITORED, "monitor.joints", [[0.1, 0.0]]),
     # keys beside those of `SCENE`, and of a law in a scene
     "laws.NAME.from": (

@@ -116,6 +116,14 @@ BOLTED = (
     + lines(**{"from": [0.0, 0.3], "to": [-0.5, -0.3]}, stiffness=2e8, capacity=8e3)
     + "[run]\nend = 1.0\nrecord = 0.003\n"
 )
+# The water table rises beside a block
+RISING = (
+    f"[laws.plain]\n{PLAIN}{BASE}{ONE}[water]\n"
+    + lines(table=[[-0.5, 0.2], [0.5, 0.0]])
+    + "[[water.at]]\n"
+    + lines(time=0.02, table=[[-0.5, 0.4], [0.5, 0.0]])
+    + "[run]\nend = 1.0\nrecord = 0.003\n"
+)
 SCENES = {  # text, steps before the state is saved, steps of the resumed run
     "impact": (IMPACT, 60, 60),
     "bounced": (IMPACT, 200, 30),
@@ -126,6 +134,7 @@ SCENES = {  # text, steps before the state is saved, steps of the resumed run
     "rocking": (ROCKING, 200, 300),
     "fast": (FAST, 20, 60),
     "bolted": (BOLTED, 60, 120),
+    "rising": (RISING, 100, 100),
 }
 
 

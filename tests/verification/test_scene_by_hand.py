@@ -682,6 +682,8 @@ class Anchored:
         + lines(stiffness=bolt_stiffness, capacity=capacity, pretension=pretension)
         + "[[pressure]]\n"
         + lines(**{"from": [0.0, 1.0], "to": [2.0, 1.0]}, value=pressure)
+        + "[monitor]\n"
+        + lines(convergence=[[[1.0, 1.0], [1.0, -0.5]]])
         + f"[run]\nend = 0.02\nrecord = 0.01\nstep = {time_step}\n"
     )
     mass = THICKNESS * density * box.prod()
@@ -706,6 +708,8 @@ class Anchored:
 
     def monitors(self, t):
         return {
+            "convergence 1: distance_m": (1.5 - self.closure, ROUNDING),
+            "convergence 1: convergence_m": (self.closure, ROUNDING),
             "bolt 1: force_N": (self.tension, 1e-3),
             "bolt 1: elongation_m": (self.tension / self.bolt_stiffness, ROUNDING),
             "bolt 1: yielding_m": (0.0, 0),

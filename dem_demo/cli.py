@@ -30,8 +30,11 @@ from .output.monitors import friction_angle
 from .output.pictures import Pictures
 from .output.record import RunRecord, format_blocks, format_outcome, list_blocks, report_lines
 from .output.run import run, steps_to
-from .scene import TEMPLATE, Scene, SceneError, load, shipped
+from .scene import TEMPLATE, Scene, SceneError, shipped
 from .scene.laws import law_warnings
+from .space import Equilibrium, SpaceScene, Statics, load
+from .space import output as space_output
+from .space.strength import strength_reduction as space_strength_reduction
 from .studies import ablate, compare, strength
 from .studies.limit_analysis import format_bound, limit_factor
 
@@ -143,28 +146,85 @@ def _run(options: argparse.Namespace) -> None:
                 "the run continues with the scene of its saved state: changes of the scene file "
                 "since then have no effect"
             )
+            _run_simulation(options, sim)
+        elif isinstance(scene := _load_scene(options.scene), SpaceScene):
+            _run_in_space(options, scene)
         else:
-            sim = Simulation(_load_scene(options.scene))
-        _describe(sim, options.until, options.format is not None)
-        dt = sim.dt
-        record, summary = run(sim, options.out, options.until, options.format, options.vtk)
-        _report(sim, record, summary, dt)
+            _run_simulation(options, Simulation(scene))
         print(f"results in {options.out}")
     if options.json:
         print((options.out / SUMMARY).read_text(encoding="utf-8"), end="")
 
 
-def _load_scene(source: str) -> Scene:
+def _load_scene(source: str) -> Scene | SpaceScene:
     """Read a scene, and print the warnings in the parameter files of its laws."""
     scene = load(source)
     _print_law_warnings(scene)
     return scene
 
 
-def _print_law_warnings(scene: Scene) -> None:
+def _print_law_warnings(scene: Scene | SpaceScene) -> None:
     """Print the warnings in the parameter files of the laws of a scene to stderr."""
     for text in law_warnings(scene.files):
         print(f"warning, {text}", file=sys.stderr)
+
+
+def _run_simulation(options: argparse.Namespace, sim: Simulation) -> None:
+    """Run a simulation to its end, and write its files."""
+    _describe(sim, options.until, options.format is not None)
+    dt = sim.dt
+    record, summary = run(sim, options.out, options.until, options.format, options.vtk)
+    _report(sim, record, summary, dt)
+
+
+def _load_in_plane(options: argparse.Namespace) -> Scene:
+    """Read the scene of a command that moves blocks. Raises ValueError for a scene in space."""
+    scene = _load_scene(options.scene)
+    if isinstance(scene, SpaceScene):
+        raise ValueError(
+            f"{options.command} {options.scene}: blocks in space do not move yet; check, run and "
+            "strength-reduction find their equilibrium"
+        )
+    return scene
+
+
+def _refuse_until(options: argparse.Namespace) -> None:
+    """Refuse --until for a scene in space. Raises ValueError."""
+    if options.until is not None:
+        raise ValueError("--until: blocks in space do not move yet; leave it out")
+
+
+def _run_in_space(options: argparse.Namespace, scene: SpaceScene) -> None:
+    """Find the equilibrium of a scene in space, and write its files."""
+    _refuse_until(options)
+    statics = Statics(scene)
+    result = statics.solve()
+    _describe_in_space(statics, result)
+    print("blocks in space do not move yet: the run ends with the static equilibrium")
+    space_output.write(statics, result, options.out, options.vtk)
+
+
+def _describe_in_space(statics: Statics, result: Equilibrium) -> None:
+    """Print size, rocks and verdict of a scene in space."""
+    scene = statics.scene
+    contacts = f"{space_output.count_contacts(statics)} contacts of faces"
+    points = f"{len(statics.points.area)} contact points"
+    print(f"{scene.title}: {int(statics.is_free.sum())} free blocks, {contacts}, {points}")
+    _print_rocks(scene)
+    print(f"initial state: {result.verdict.value}")
+    _print_unstable(scene, result.verdict.value, result.unstable)
+
+
+def _check_in_space(scene: SpaceScene) -> None:
+    """Validate a scene in space, and warn of laws that do not suit the stresses of their joints."""
+    statics = Statics(scene)
+    result = statics.solve()
+    _describe_in_space(statics, result)
+    for number, (name, law) in enumerate(scene.laws.items()):
+        stress = result.traction[statics.law == number, 0].max(initial=0.0)
+        if isinstance(law, JointLaw):
+            _warn_of_closure_range(name, law, float(stress))
+    print("the scene is valid")
 
 
 def _report(sim: Simulation, record: RunRecord, summary: dict, initial_dt: float) -> None:
@@ -200,23 +260,33 @@ def _describe(sim: Simulation, until: float | None = None, with_pictures: bool =
         f"{steps} steps"
     )
     _print_estimate(sim, steps, until, with_pictures)
+    _print_rocks(scene)
+    if sim.verdict and not sim.time:
+        _print_verdict(sim)
+
+
+def _print_rocks(scene: Scene | SpaceScene) -> None:
+    """Print the numbers of blocks of each rock, and what was done with its slivers."""
     for rock in scene.rocks:
         fixed = len(rock.blocks) - len(rock.free)
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, {fixed} fixed")
         for message in rock.messages:
             print(f"  {message}")
-    if sim.verdict and not sim.time:
-        _print_verdict(sim)
 
 
 def _print_verdict(sim: Simulation) -> None:
     """Print the verdict on the initial equilibrium, with the unstable blocks."""
     print(f"initial state: {sim.verdict}")
-    if not sim.unstable.any():
+    _print_unstable(sim.scene, sim.verdict, sim.unstable)
+
+
+def _print_unstable(scene: Scene | SpaceScene, verdict: str, unstable: np.ndarray) -> None:
+    """Print the blocks (n,) without static equilibrium, if any."""
+    count = int(unstable.sum())
+    if not count:
         return
-    count = int(sim.unstable.sum())
-    blocks = format_blocks(list_blocks(sim.scene, sim.unstable))
-    if sim.verdict == Verdict.NOT_DECIDED.value:
+    blocks = format_blocks(list_blocks(scene, unstable))
+    if verdict == Verdict.NOT_DECIDED.value:
         number = "1 block" if count == 1 else f"{count} blocks"
         print(
             f"the search found no equilibrium of {number}, and no steady motion that excludes one "
@@ -224,7 +294,8 @@ def _print_verdict(sim: Simulation) -> None:
         )
     else:
         number = "1 block has" if count == 1 else f"{count} blocks have"
-        print(f"{number} no static equilibrium and will move from the first step: {blocks}")
+        moves = " and will move from the first step" if isinstance(scene, Scene) else ""
+        print(f"{number} no static equilibrium{moves}: {blocks}")
 
 
 def _print_limit_analysis(scene: Scene) -> None:
@@ -282,7 +353,11 @@ def _new(options: argparse.Namespace) -> None:
 
 def _check(options: argparse.Namespace) -> None:
     """Validate a scene, and warn of laws that do not suit the stresses of their joints."""
-    sim = Simulation(_load_scene(options.scene))
+    scene = _load_scene(options.scene)
+    if isinstance(scene, SpaceScene):
+        _check_in_space(scene)
+        return
+    sim = Simulation(scene)
     _describe(sim)
     if sim.verdict:
         _print_limit_analysis(sim.scene)
@@ -361,13 +436,13 @@ def _warn_of_bond(name: str, law: JointLaw, stress: float) -> None:
 def _ablate(options: argparse.Namespace) -> None:
     """Run a scene without each of its ingredients in turn."""
     options.out.mkdir(parents=True, exist_ok=True)  # raises before the work if it cannot be made
-    print(ablate.write(ablate.ablate(_load_scene(options.scene), options.until), options.out))
+    print(ablate.write(ablate.ablate(_load_in_plane(options), options.until), options.out))
     print(f"results in {options.out}: {ABLATION}")
 
 
 def _compare(options: argparse.Namespace) -> None:
     """Run each rock of a scene with its own laws and with Coulomb's law."""
-    scene = _load_scene(options.scene)
+    scene = _load_in_plane(options)
     if not scene.rocks:
         raise ValueError(f"{options.scene} has no [[rock]] to compare")
     for row in compare.compare(scene, options.seeds, options.until):
@@ -390,12 +465,9 @@ def _reduce_strength(options: argparse.Namespace) -> None:
         options.out.mkdir(parents=True, exist_ok=True)
         if options.force:
             (options.out / TRIALS).unlink(missing_ok=True)
-        default_end = min(scene.run.end, FAILURE_RUN_TIME)
-        until = default_end if options.until is None else options.until
-        tell = partial(print, flush=True)
         rows = []
         try:
-            for row in strength.strength_reduction(scene, until, options.out, options.format, tell):
+            for row in _strength_rows(options, scene):
                 print(f"{row['rock']}: {_format_strength(row)}", flush=True)
                 rows.append(row)
         except KeyboardInterrupt:
@@ -404,9 +476,22 @@ def _reduce_strength(options: argparse.Namespace) -> None:
                 "continues"
             ) from None
         write_json(options.out / STRENGTH, {"version": STRENGTH_VERSION, "rows": rows})
-        print(f"{STRENGTH} and pictures of the failure in {options.out}")
+        pictures = "" if isinstance(scene, SpaceScene) else " and pictures of the failure"
+        print(f"{STRENGTH}{pictures} in {options.out}")
     if options.json:
         print((options.out / STRENGTH).read_text(encoding="utf-8"), end="")
+
+
+def _strength_rows(options: argparse.Namespace, scene: Scene | SpaceScene) -> Iterator[dict]:
+    """Yield the rows of a strength reduction, in the plane or in space."""
+    tell = partial(print, flush=True)
+    if isinstance(scene, SpaceScene):
+        _refuse_until(options)
+        yield space_strength_reduction(scene, options.out, tell)
+        return
+    default_end = min(scene.run.end, FAILURE_RUN_TIME)
+    until = default_end if options.until is None else options.until
+    yield from strength.strength_reduction(scene, until, options.out, options.format, tell)
 
 
 def _format_strength(row: dict[str, Any]) -> str:
@@ -421,7 +506,7 @@ def _format_strength(row: dict[str, Any]) -> str:
         if key in row:
             text = f"no {name}" if row[key] is None else f"{name} {row[key]:.3g}{unit}"
             bound = BOUND_OF.get(key)
-            parts.append(f"{text} ({format_bound(row[bound])})" if bound else text)
+            parts.append(f"{text} ({format_bound(row[bound])})" if bound in row else text)
     return ", ".join(parts)
 
 

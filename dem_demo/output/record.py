@@ -3,6 +3,7 @@
 import csv
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -107,22 +108,23 @@ class RunRecord:
         write_csv(path, columns, zip(*columns.values(), strict=True))
 
 
-def list_blocks(scene: Scene, mask: np.ndarray) -> list[dict]:
-    """List names and centroids as drawn (m) of the blocks of a mask (n,)."""
+def list_blocks(scene: Any, mask: np.ndarray) -> list[dict]:
+    """List names and centroids as drawn (m) of the blocks of a mask (n,); in the plane or in
+    space."""
     listed = []
     for block, is_listed in zip(scene.blocks, mask, strict=True):
         if is_listed:
-            x, y = block.centroid.tolist()
-            listed.append({"block": block.name, "x_m": x, "y_m": y})
+            places = zip("xyz", block.centroid.tolist(), strict=False)
+            listed.append({"block": block.name} | {f"{axis}_m": value for axis, value in places})
     return listed
 
 
 def format_blocks(blocks: list[dict]) -> str:
     """Format names and centroids of some blocks for the terminal, "none" without blocks."""
-    parts = [
-        f"{block['block']} ({block['x_m']:.2f}, {block['y_m']:.2f})"
-        for block in blocks[:MAX_LISTED_BLOCKS]
-    ]
+    parts = []
+    for block in blocks[:MAX_LISTED_BLOCKS]:
+        places = (f"{block[key]:.2f}" for key in ("x_m", "y_m", "z_m") if key in block)
+        parts.append(f"{block['block']} ({', '.join(places)})")
     if len(blocks) > MAX_LISTED_BLOCKS:
         parts.append(f"and {len(blocks) - MAX_LISTED_BLOCKS} more")
     return ", ".join(parts) or "none"

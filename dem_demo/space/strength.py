@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..output.record import format_blocks, list_blocks
 from ..studies.strength import LOG_FACTOR, SHOWN_REDUCTION, STRENGTHENED, LimitSearch, Trials
 from .scene import SpaceScene
 from .statics import Statics
@@ -36,15 +37,6 @@ def factor_of_safety(
     with LimitSearch(solve, trials or Trials(scene), f"{name}: factor of safety") as search:
         log_factor = search.upwards(LOG_FACTOR._replace(tolerance=tolerance))
     return None if log_factor is None else float(np.exp(log_factor))
-
-
-def list_blocks(scene: SpaceScene, mask: np.ndarray) -> list[dict[str, Any]]:
-    """List names and centroids as drawn (m) of the blocks of a mask (n,)."""
-    listed = []
-    for i in np.flatnonzero(mask).tolist():
-        x, y, z = scene.blocks[i].centroid.tolist()
-        listed.append({"block": scene.blocks[i].name, "x_m": x, "y_m": y, "z_m": z})
-    return listed
 
 
 def strength_reduction(
@@ -93,6 +85,7 @@ def strength_reduction(
             partial(_unstable_blocks, statics, weak),
         )
         row["initiating_blocks"] = [block for block in failing if block["block"] not in names]
+        tell(f"initiating blocks: {format_blocks(row['initiating_blocks'])}")
     return row
 
 

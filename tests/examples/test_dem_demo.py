@@ -22,6 +22,8 @@ from dem_demo.dynamics import timestep
 from dem_demo.output.pictures import Pictures
 from dem_demo.output.record import RunRecord
 from dem_demo.scene import shipped
+from dem_demo.space import SpaceScene
+from dem_demo.space import load as load_in_space
 
 BASE = block("base", box=[4.0, 1.0], at=[0.5, -0.5], fixed=True)
 ONE = block("one", box=[1.0, 0.5], at=[0.0, 0.25])
@@ -156,8 +158,9 @@ def test_history_points_are_relative_to_driven_fixed_rock(tmp_path):
 def test_scenes_are_valid(name, capsys):
     assert main(["check", name]) == 0
     printed = capsys.readouterr()
-    assert "stability limit" in printed.out
-    assert " for figures and animation" in printed.out
+    if not isinstance(load_in_space(name), SpaceScene):  # which do not move yet
+        assert "stability limit" in printed.out
+        assert " for figures and animation" in printed.out
     assert "the scene is valid" in printed.out
     assert "warning" not in printed.err
 

@@ -11,13 +11,14 @@ from wedges import WEDGES, factor_by_hand, line_of, wedge_text
 
 import jointlaw as jl
 from dem_demo.dynamics.relaxation import Verdict
+from dem_demo.output.record import list_blocks
 from dem_demo.scene import load
 from dem_demo.space.contacts import find_contacts
 from dem_demo.space.read import parse
 from dem_demo.space.scene import SpaceBlock, SpaceScene
 from dem_demo.space.solids import extruded
 from dem_demo.space.statics import Statics
-from dem_demo.space.strength import factor_of_safety, list_blocks, strength_reduction
+from dem_demo.space.strength import factor_of_safety, strength_reduction
 from dem_demo.studies import strength
 
 FRICTION = tan(radians(30.0))

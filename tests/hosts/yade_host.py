@@ -72,20 +72,21 @@ def attempt(name, action):
 """
 
 
-def run_yade(folder, script, *args, live=False, code=0):
-    """Run a script in its folder with YADE; returns the output."""
-    env = os.environ | {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+def run_yade(folder, script, *args, live=False, code=0, threads="1"):
+    """Run a script in its folder with YADE on some threads; returns the output."""
+    env = os.environ | {"OMP_NUM_THREADS": threads, "MPLBACKEND": "Agg"}
     env["PYTHONPATH"] = str(Path(jl.__file__).parents[1]) if live else ""
     return run_program(
-        find_program("yade"), "-n", "-x", script, *args, code=code, cwd=folder, env=env
-    )
+        find_program("yade"), f"-j{threads}", "-n", "-x", script, *args, code=code, cwd=folder,
+        env=env,
+    )  # fmt: skip
 
 
-def run_scene(folder, script, live=False, preamble=PREAMBLE):
+def run_scene(folder, script, live=False, preamble=PREAMBLE, threads="1"):
     """Run a scene; returns the values that it passes to `result(...)`, by name."""
     (folder / "scene.py").write_text(preamble + script)
     copy_files(folder)
-    _, mark, rest = run_yade(folder, "scene.py", live=live).rpartition(MARK)
+    _, mark, rest = run_yade(folder, "scene.py", live=live, threads=threads).rpartition(MARK)
     assert mark, rest
     return json.loads(rest.splitlines()[0])
 

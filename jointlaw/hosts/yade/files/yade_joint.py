@@ -13,12 +13,17 @@ Why it works as it does:
   the same step, which keeps the time integration symplectic.
 - The contact force of YADE is switched off by kn = ks = 0. YADE has already applied its force
   in the step in which a contact forms; the adapter subtracts it.
-- The history of a joint belongs to a contact, not to a pair of bodies: two bodies that separate and
-  meet again form a new contact. YADE may replace an interaction by a new one of the same bodies, so
+- The history of a joint belongs to a contact, not to a pair of ids: two bodies that separate and
+  meet again form a new contact, and YADE may give the id of an erased body to another one. So
   `interaction_key` is the two ids and the iteration in which the interaction became real.
-- Each step compares YADE's number of real interactions with the number of known ones. Interactions
-  that ended are recognised by `isReal`, new ones by `iterMadeReal`. If the numbers do not agree,
-  for example after bodies were erased or a scene was loaded, all interactions are matched by key.
+- To read the keys of all interactions in every step would cost as much as YADE's own contact law.
+  Each step instead checks that no contact can have ended unnoticed. An interaction that ended has
+  another `iterMadeReal`, or none. Erasing a body removes its interactions, which look as before
+  from Python, but the id of the erased body becomes -1: the adapter keeps all bodies whose
+  interactions it knows, and compares their ids. After `O.interactions.clear()` a known interaction
+  is no longer found by its ids. If any check fails, or the number of bodies changed, all
+  interactions are matched by key. Otherwise the known contacts exist, the difference to YADE's
+  number of real interactions is the number of new ones, and these have the present `iterMadeReal`.
 - Arrays hold one column per contact, in the order of `interactions`. Law, geometry and forces are
   computed for all contacts in a few calls of numpy.
 - The frame of a contact rotates with the bodies. Increments are computed in the mean frame of a
@@ -35,9 +40,11 @@ SI units: m, Pa, N, s, kg.
 
 # ruff: noqa: B905 (older versions of Python lack strict=)
 
+from operator import attrgetter
+
 import numpy as np
 from joint_table import load_table
-from yade import Body, FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
+from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
 
 VERSION = 2  # of the files that `Joints.save` writes
 
@@ -222,8 +229,12 @@ class Joints:
         }
         self.contact_data.update({one: np.zeros((3, 0)) for one in VECTORS})
         self.interactions = []
+        self.created = []  # `iterMadeReal` of the interactions
         self.other_interactions = {}  # not joints, by `interaction_key`
-        self.states = {}  # of bodies with joints, by id; None before the first step after `load`
+        # of bodies with joints, by id; None before the first step after `load`
+        self.bodies = {}
+        self.states = []
+        self.other_bodies = {}  # of other interactions, by id
         self.x = np.zeros((3, 0))
         self.q = np.zeros((4, 0))
         self.last_iteration = None  # O.iter
@@ -421,14 +432,14 @@ class Joints:
     def _apply_forces(self, force, c1, c2):
         """Add the forces on id1, the opposite forces on id2, and their torques to the bodies."""
         c = self.contact_data
-        size = len(self.states)
+        size = len(self.bodies)
         torque1 = cross(c1, force)
         torque2 = cross(force, c2)
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
         turn = [np.bincount(c["b1"], t1, size) + np.bincount(c["b2"], t2, size)
                 for t1, t2 in zip(torque1, torque2)]  # fmt: skip
         forces = O.forces
-        for k, f, t in zip(self.states, np.array(total).T.tolist(), np.array(turn).T.tolist()):
+        for k, f, t in zip(self.bodies, np.array(total).T.tolist(), np.array(turn).T.tolist()):
             forces.addF(k, f)
             forces.addT(k, t)
 
@@ -436,15 +447,29 @@ class Joints:
 
     def _update_contacts(self, now):
         """Update the joints after YADE's contact detection; returns the indices of new ones."""
-        if len(O.bodies) != self.body_count:
+        if self._may_have_lost_contacts():
             return self._create_joints(self._match_by_key())
-        real = [i.isReal for i in self.interactions]
-        if not all(real):
-            self._keep_contacts(np.array(real))
-        self.other_interactions = {one: i for one, i in self.other_interactions.items() if i.isReal}
+        created = list(map(iter_made_real, self.interactions))
+        if created != self.created:
+            self._keep_contacts(np.array(created, int) == self.contact_data["created"])
+        others = self.other_interactions
+        if list(map(iter_made_real, others.values())) != [key[2] for key in others]:
+            self.other_interactions = {
+                key: i for key, i in others.items() if i.iterMadeReal == key[2]
+            }
         missing = O.interactions.countReal() - len(self.interactions) - len(self.other_interactions)
         new = [i for i in O.interactions.all(True) if i.iterMadeReal == now] if missing else []
         return self._create_joints(new if len(new) == missing else self._match_by_key())
+
+    def _may_have_lost_contacts(self):
+        """Whether bodies or all interactions were erased since the last step, or a scene loaded."""
+        if len(O.bodies) != self.body_count:
+            return True
+        for bodies in (self.bodies, self.other_bodies):
+            if list(map(body_id, bodies.values())) != list(bodies):
+                return True
+        known = self.interactions or list(self.other_interactions.values())
+        return any(not O.interactions.has(i.id1, i.id2) for i in known[:1])
 
     def _match_by_key(self):
         """Match all interactions by key, which is slow; returns the new ones."""
@@ -456,14 +481,34 @@ class Joints:
         self.other_interactions = {
             one: real.pop(one) for one in self.other_interactions if one in real
         }
-        # a body that was erased before the checkpoint has no contacts
-        self.states = {k: one or (O.bodies[k] or Body()).state for k, one in self.states.items()}
+        ids = {k for key in self.other_interactions for k in key[:2]}
+        self.other_bodies = {k: O.bodies[k] for k in ids}
+        self._keep_bodies()
         self.body_count = len(O.bodies)
         return list(real.values())
+
+    def _keep_bodies(self):
+        """Keep the bodies of the present joints, and forget all others."""
+        c = self.contact_data
+        used = {*c["id1"].tolist(), *c["id2"].tolist()}
+        place = [n for n, k in enumerate(self.bodies) if k in used]
+        self.bodies = {k: O.bodies[k] for k in self.bodies if k in used}
+        self.states = [body.state for body in self.bodies.values()]
+        self.x = self.x[:, place]
+        self.q = self.q[:, place]
+        self._number_bodies()
+
+    def _number_bodies(self):
+        """Write the places of the bodies in the arrays of bodies."""
+        c = self.contact_data
+        place = {k: n for n, k in enumerate(self.bodies)}
+        for b, ids in (("b1", "id1"), ("b2", "id2")):
+            c[b] = np.array([place[k] for k in c[ids].tolist()], int)
 
     def _keep_contacts(self, mask):
         """Remove the contacts for which `mask` is False."""
         self.contact_data = {key: value[..., mask] for key, value in self.contact_data.items()}
+        self.created = self.contact_data["created"].tolist()
         self.interactions = [i for i, keep in zip(self.interactions, mask) if keep]
         self.law.keep_contacts(mask)
 
@@ -474,6 +519,7 @@ class Joints:
         for i in contacts:
             if self.select is not None and not self.select(i):
                 self.other_interactions[interaction_key(i)] = i
+                self.other_bodies.update({k: O.bodies[k] for k in (i.id1, i.id2)})
                 continue
             if not isinstance(i.geom, ScGeom) or type(i.phys) is not FrictPhys:
                 raise TypeError(
@@ -489,13 +535,13 @@ class Joints:
         self.interactions += created
         new = dict(zip(("id1", "id2", "created", "R1", "R2", "both_spheres", "area"), zip(*rows)))
         for k in (*new["id1"], *new["id2"]):
-            self.states.setdefault(k, O.bodies[k].state)
+            self.bodies.setdefault(k, O.bodies[k])
         self._add_bodies()
-        place = {k: n for n, k in enumerate(self.states)}
-        new["b1"], new["b2"] = ([place[k] for k in new[ids]] for ids in ("id1", "id2"))
         for name, value in self.contact_data.items():
             more = np.broadcast_to(new.get(name, 0), (*value.shape[:-1], len(created)))
             self.contact_data[name] = np.concatenate([value, more], axis=-1)
+        self.created = self.contact_data["created"].tolist()
+        self._number_bodies()
         self._initialise_frames(fresh)
         return fresh
 
@@ -541,7 +587,8 @@ class Joints:
         """Positions of new bodies one step ago, from their velocities (YADE's leapfrog)."""
         x = []
         q = []
-        for state in list(self.states.values())[self.x.shape[1] :]:
+        self.states = [body.state for body in self.bodies.values()]
+        for state in self.states[self.x.shape[1] :]:
             angle = state.angVel.norm() * O.dt
             axis = state.angVel.normalized() if angle > 0 else Vector3(0, 0, 1)
             x.append((state.pos - state.vel * O.dt).__getinitargs__())
@@ -551,10 +598,9 @@ class Joints:
 
     def _read_bodies(self):
         """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
-        states = self.states.values()
         return (
-            columns([s.pos.__getinitargs__() for s in states], 3),
-            columns([s.ori.__getinitargs__() for s in states], 4),
+            columns([s.pos.__getinitargs__() for s in self.states], 3),
+            columns([s.ori.__getinitargs__() for s in self.states], 4),
         )
 
     # ------------------------------------------------------ checkpoints and output
@@ -566,7 +612,7 @@ class Joints:
         data["others"] = np.array(list(self.other_interactions), int)
         data["last"] = -1 if self.last_iteration is None else self.last_iteration
         with open(path, "wb") as file:
-            np.savez(file, version=VERSION, ids=list(self.states), x=self.x, q=self.q, **data)
+            np.savez(file, version=VERSION, ids=list(self.bodies), x=self.x, q=self.q, **data)
 
     def load(self, path):
         """Restore a checkpoint of `save`: call it after O.load, before the next step.
@@ -592,7 +638,9 @@ class Joints:
         self.contact_data = {
             key[8:]: value for key, value in data.items() if key.startswith("contact_")
         }
-        self.states = dict.fromkeys(data["ids"].tolist())
+        self.bodies = dict.fromkeys(data["ids"].tolist())
+        self.states = []
+        self.other_bodies = {}
         self.x = data["x"]
         self.q = data["q"]
         self.last_iteration = int(data["last"]) if data["last"] >= 0 else None
@@ -622,8 +670,12 @@ class Joints:
 # ------------------------------------------------ contacts, vectors and rotations
 
 
+iter_made_real = attrgetter("iterMadeReal")
+body_id = attrgetter("id")
+
+
 def interaction_key(i):
-    """Identifies an interaction, also among successive ones of the same two bodies."""
+    """Identifies an interaction, also among successive ones of the same two ids."""
     return i.id1, i.id2, i.iterMadeReal
 
 

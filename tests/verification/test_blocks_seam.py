@@ -5,6 +5,7 @@ block is displaced, separated by more than a skin, or has joints of another law,
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -95,6 +96,43 @@ def test_normal_force_between_floor_and_roof(law, slant):
     assert expected[-1, 2] - expected[0, 2] > 0.4
     np.testing.assert_allclose(actual[:, :2], expected[:, :2], rtol=1e-3)
     assert actual[-1, :2] == pytest.approx(expected[-1, :2], rel=1e-5)
+    assert abs(two.energy_balance.error - one.energy_balance.error) < 1e-5
+
+
+def layer(name, left, right, low, high, seams, **keys):
+    """Blocks of a layer that vertical seams divide."""
+    bounds = [left, *seams, right]
+    return "".join(
+        block(f"{name} {i}", corners=[[a, low], [b, low], [b, high], [a, high]], **keys)
+        for i, (a, b) in enumerate(pairwise(bounds))
+    )
+
+
+@LAWS
+def test_two_slabs_under_a_divided_roof(law):
+    """Two slabs in a row slide over two seams of the floor, and under two of the roof."""
+    end = 1.2
+
+    def run(floor_seams, roof_seams, step=None):
+        text = f"[laws.rock]\n{law}"
+        text += layer("floor", -2.0, 3.0, -1.0, 0.0, floor_seams, fixed=True)
+        text += layer("slab", -1.02, -0.02, 0.0, 0.3, [-0.5])
+        text += layer("roof", -2.0, 3.0, 0.3, 1.3, roof_seams, fixed=True)
+        text += "[in_situ]\nstress = [1e5, 1e5, 0.0]\n"
+        for slab in ("slab 0", "slab 1"):
+            text += f"[[drive]]\nblock = '{slab}'\nmotion = 'x'\n"
+            text += lines(times=[0.0, end], values=[0.0, SLIDE * end])
+        sim = Simulation(parse(f"{text}[run]\n{lines(end=end, skin=SKIN)}"), step=step)
+        until(sim, end)
+        names = np.array([block.name.split()[0] for block in sim.scene.blocks])
+        contacts = sim.contacts
+        pairs = names[contacts.block_a] + names[contacts.block_b]
+        force = contacts.area * sim.joints.traction[:, 0]
+        return sim, [force[pairs == pair].sum() for pair in ("floorslab", "slabroof")]
+
+    one, expected = run([], [])
+    two, actual = run([0.0, 0.15], [0.1, 0.2], step=one.dt)
+    assert actual == pytest.approx(expected, rel=1e-5)
     assert abs(two.energy_balance.error - one.energy_balance.error) < 1e-5
 
 

@@ -24,13 +24,16 @@ class BlockOnPlane:
     """Block 1 over the fixed block 0, whose top is z = 0; its four lower corners are the contact
     points, each with a quarter of the area."""
 
-    def __init__(self, gravity, law, n_points=4):
+    def __init__(self, gravity, law, n_points=4, azimuth=0.0):
+        """gravity in m/s2; azimuth (rad): of the law's axis 2, from x."""
         mass = DENSITY * SIZE.prod()
         moments = mass / 12 * ((SIZE**2).sum() - SIZE**2)
         self.inertia = np.tile([mass] * 3 + moments.tolist(), (2, 1))
         self.gravity = np.array([[0.0] * 6, [*(mass * np.array(gravity)), 0.0, 0.0, 0.0]])
         self.is_mobile = np.array([False, True])
         self.is_free = self.is_mobile[:, None].repeat(6, axis=1)
+        cosine, sine = np.cos(azimuth), np.sin(azimuth)
+        self.directions = np.array([[0.0, 0.0, -1.0], [cosine, sine, 0.0], [-sine, cosine, 0.0]])
         self.inverse_sqrt_inertia = self.is_free / np.sqrt(self.inertia)
         self.inverse_mass = self.is_mobile / mass
         self.motion = np.zeros((12, 2))
@@ -50,27 +53,38 @@ class BlockOnPlane:
         self.fill_rows()
 
     def fill_rows(self):
-        """Closure is the depth of a corner below the plane; shears are along x and y."""
+        """Closure is the depth of a corner below the plane; shears are along axes 2 and 3."""
         rows = self.rows
         place = self.motion[:3, 1]
         axes = self.axes[1]
-        directions = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         for i in range(len(rows.area)):
             arm = axes @ CORNERS[i]
             rows.closure[i] = -(place + arm)[2]
-            rows.kinematics[i, :, 6:9] = directions
-            rows.kinematics[i, :, 9:] = np.cross(arm, directions) @ axes
+            rows.kinematics[i, :, 6:9] = self.directions
+            rows.kinematics[i, :, 9:] = np.cross(arm, self.directions) @ axes
             rows.kinematics[i, :, :6] = -rows.kinematics[i, :, 6:]  # a fixed block: any value
 
-    def start(self, fraction=0.3, dt=None):
-        """Bind the arrays; velocities are half a step ahead of positions."""
+    def start(self, fraction=0.3, dt=None, driven=None):
+        """Bind the arrays; velocities are half a step ahead of positions.
+
+        driven: velocities of prescribed motions of the block, by their number.
+        """
+        axes = np.array([*(driven or {})], np.int64)
+        speeds = np.array([*(driven or {}).values()], float)
+        self.is_free[1, axes] = False
+        self.inverse_sqrt_inertia *= self.is_free
+        self.velocity[axes, 1] = speeds
         joints, rows, n = self.joints, self.rows, 2
         stiffness = joints.interpolate("stiffness", "closure", rows.closure) * rows.area
         self.dt = dt or fraction * bound_of_blocks(self, rows, stiffness, 0.0 * stiffness)
         self.arrays = StepArrays(
             n_blocks=n, n_contacts=joints.n, dim=3, dof=6, law_steps=1.0, dashpot_normal=0.1,
             dashpot_shear=0.1, max_skin_per_step=np.inf, max_skin_until_rebuild=np.inf,
+            n_driven=len(axes),
         )  # fmt: skip
+        self.arrays.bind(
+            driven_block=np.ones(len(axes), np.int64), driven_axis=axes, driven_velocity=speeds
+        )
         self.callback = UPDATE_GEOMETRY(lambda _: self.fill_rows() or 0)
         self.arrays.update_geometry = ctypes.cast(self.callback, ctypes.c_void_p).value
         self.arrays.bind(
@@ -191,3 +205,42 @@ def test_bound_of_the_time_step_in_space():
         exact, rel=1e-6
     )
     assert address(block.rows.keys)  # contiguous, as for the compiled step
+
+
+@pytest.mark.parametrize("rough", [False, True], ids=["coulomb", "rough"])
+def test_a_drive_pulls_a_block_over_its_base(rough):
+    """A drive pulls a block along x, at 45 degrees to the axes of the law; y and z are free.
+
+    The work of the drive is friction, stored and kinetic energy. A joint that is rougher along axis
+    2 lets the block yield along axis 3; Coulomb's joint does not.
+    """
+    speed = 0.02
+    if rough:
+        law = jl.JointLaw(
+            asperity_density=1e4,
+            mating_length=2e-3,
+            orientation=jl.Orientation(a=3.0, c=0.3),
+            asperity=jl.Asperity(K=9.5e6, lam=1.2, eta=0.5, mu=0.4),
+            heights=jl.GammaHeights(alpha=3.82, beta=1.15e-3, overlap=3e-3),
+        )
+    else:
+        law = jl.CoulombLaw(normal_stiffness=1e9, shear_stiffness=5e8, friction=FRICTION)
+    block = BlockOnPlane([0.0, 0.0, -9.81], law, azimuth=np.pi / 4)
+    stress = DENSITY * SIZE[2] * 9.81
+    block.motion[2, 1] -= float(law.closure(stress)) if rough else stress / 1e9
+    block.fill_rows()
+    block.joints.update(block.rows.closure, np.zeros((4, 2)))
+    block.start(driven={0: speed, 3: 0.0, 4: 0.0, 5: 0.0})
+    time = block.run(0.2)
+    assert block.motion[0, 1] == pytest.approx(speed * time, rel=1e-3)  # half a step later
+    sideways = block.motion[1, 1]
+    work = block.balance.value["external_work"]
+    if rough:
+        assert sideways < -1e-4
+        assert block.motion[2, 1] > SIZE[2] / 2 + 1e-4  # dilates
+        assert 0.3 < work / (stress * SIZE[0] * SIZE[1] * speed * time) < 1.2
+    else:
+        assert sideways == pytest.approx(0.0, abs=1e-12)
+        friction = FRICTION * stress * SIZE[0] * SIZE[1] * speed * time
+        assert work == pytest.approx(friction, rel=1e-2)
+    assert abs(block.balance.error) < 1e-3  # friction is first-order accurate in the sudden start

@@ -208,7 +208,7 @@ def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, cycle, caps
     assert main(line.split()) == 0
     captured = capsys.readouterr()
     assert "no picture: pictures need matplotlib" in captured.err
-    assert "wrote law.toml, report.md, summary.json to o" in captured.out
+    assert "wrote points.csv, law.toml, report.md, summary.json to o" in captured.out
     fitted = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
     assert (fitted.asperity, fitted.heights.overlap) == (law.asperity, law.heights.overlap)
     assert fitted.heights.formation == law.heights.formation == "population"

@@ -59,6 +59,12 @@ PROBES = {
         "name": ("presets", "presets linear-a3"),
         "--json": ("presets", "presets --json"),
     },
+    "card": {
+        "law": ("card linear-a3", "card biegel-rough"),
+        "--default-rock": ("card surface.toml", "card surface.toml --default-rock"),
+        "--resolution": ("card linear-a3", "--resolution fast"),
+        "--json": ("card linear-a3", "--json"),
+    },
     "shear": {
         "--normal-stress": ("shear linear-a3 " + SHEAR, "--normal-stress 5MPa"),
         "--to": ("shear linear-a3 --steps 3 --to 1um", "shear linear-a3 --steps 3 --to 2um"),
@@ -191,7 +197,7 @@ BINARIES = (".zip", ".png", ".svg", ".pdf", ".gif", ".npz", ".npy", ".so", ".vtu
 # of a run, which differ from run to run, and the command line that a report repeats
 TIMES = (
     r'"wall_time_s": [^,}]*|estimated .*|"date": .*|"command": .*|jointlaw [\d.]+, 20.*'
-    r"|    jointlaw .*"
+    r"|    jointlaw .*|(?m:^(command|date) = .*)"
 )
 REFUSALS = ("called with", "the fitted a = ")  # of work that is replaced; of heights in nm
 FROM_FIELD = cache(jointlaw.cli.field.from_field)
@@ -275,6 +281,11 @@ NO_FIT = Mock(parameters={}, free=[], identifiable=[], series_names=[], shape_di
 NO_FIT.report.return_value = ""
 NO_FIT.comparisons.return_value = []
 NO_FIT.law.asperity_density = 1.0
+NO_FIT.problem.shears = []
+NO_FIT.problem.closure.stress = [1.0]
+NO_FIT.not_identifiable = {}
+NO_FIT.has_trade_off = False
+NO_FIT.law.to_toml.return_value = ""
 
 
 def report(*arguments, **keywords):

@@ -3,6 +3,7 @@
 import argparse
 import io
 import math
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from .command import (
     PICTURE_FORMAT,
     Command,
     Contents,
+    new_about,
     option,
     quantity,
     write_results,
@@ -58,9 +60,12 @@ def _run(options: argparse.Namespace) -> None:
         },
         "sampling_length_m": fit.asperities.size,
         "not_identifiable": fit.not_identifiable,
+        "warnings": list(_warnings(fit)),
     }
+    inputs = [options.file, *([options.upper] if options.upper else [])]
+    about = new_about(options, inputs, _warnings(fit), _origin(fit))
     files: Contents = {
-        "surface.toml": _surface_toml(fit, name),
+        "surface.toml": f"{_surface_toml(fit, name)}\n{about.to_toml()}",
         "report.md": text,
         "scan.png": fit.plot,
     }
@@ -73,6 +78,22 @@ def _run(options: argparse.Namespace) -> None:
         }
         files = {**files, "composite.npy": partial(_save_heights, z=z)}
     write_results(options, files, summary, text)
+
+
+def _warnings(fit: SurfaceFit) -> Iterator[str]:
+    """Yield the caveats of a law with these asperities."""
+    yield f"asperities of a sampling length of {1e3 * fit.asperities.size:.4g} mm"
+    yield from fit.warnings
+    for name, reason in fit.not_identifiable.items():
+        yield f"{name} is not identifiable from the scan: {reason}"
+
+
+def _origin(fit: SurfaceFit) -> dict[str, str]:
+    """Origin of the parameters that a scan determines."""
+    return {
+        name: f"measured on the scan, standard error {estimate.standard_error:.2g}"
+        for name, estimate in fit.estimates.items()
+    }
 
 
 def _report_friction(fit: SurfaceFit, z: Array) -> str:

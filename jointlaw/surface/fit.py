@@ -142,31 +142,35 @@ class SurfaceFit:
             "the size of the contacts that carry the load, and state it with the result.",
             "",
             *table("rms slope (Z2) | along the rows | across them", slope_rows),
-            *self._warnings(),
+            *(line for text in self.warnings for line in ("", f"Warning: {text}.")),
         ]
         return "\n".join(lines) + "\n"
 
-    def _warnings(self) -> list[str]:
-        """Lines of the report about spikes and noise."""
-        lines = []
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user of these asperities has to know, for report and parameter file."""
+        warnings = []
+        if not self.orientation_is_representative:
+            warnings.append(
+                "the slopes of law and surface differ by more than 20 %, or the "
+                "orientation is not identifiable: do not use its friction angle"
+            )
         if len(self.spikes):
             row, column = self.spikes[0]
-            lines += [
-                "",
-                f"Warning: {len(self.spikes)} points are spikes, far above or below all their "
-                f"neighbours (the first in row {row}, column {column}, counted from 0): replace "
-                "them, for example by the median of their neighbours, and scan again.",
-            ]
+            warnings.append(
+                f"{len(self.spikes)} points are spikes, far above or below all their neighbours "
+                f"(the first in row {row}, column {column}, counted from 0): replace them, for "
+                "example by the median of their neighbours, and scan again"
+            )
         median_slope = float(np.median(np.linalg.norm(self.asperities.slope, axis=-1)))
         slope_noise = self.asperities.slope_noise
         if slope_noise > MAX_SLOPE_NOISE * median_slope:
-            lines += [
-                "",
-                f"Warning: the noise of the slopes is {100 * slope_noise / median_slope:.0f} % of "
-                "the median slope: summits may be displaced, and a and b wrong; increase "
-                "sampling_length.",
-            ]
-        return lines
+            warnings.append(
+                f"the noise of the slopes is {100 * slope_noise / median_slope:.0f} % of the "
+                "median slope: summits may be displaced, and a and b wrong; increase "
+                "sampling_length"
+            )
+        return tuple(warnings)
 
 
 def from_surface(z: ArrayLike, spacing: float, sampling_length: float | None = None) -> SurfaceFit:

@@ -7,6 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 from scene_text import block, lines
+from scipy.ndimage import gaussian_filter
 
 import jointlaw as jl
 from dem_demo.cli import main as dem_main
@@ -150,3 +151,23 @@ def test_a_card_as_json(law_file, capsys):
     assert card["parameters_SI"]["asperity.mu"] == law.asperity.mu
     assert card["warnings"] == [CAVEAT]
     assert card["sha256"] == {"scan 1.csv": "ab12"}
+
+
+def test_a_scan_that_withholds_a_friction_angle_warns_every_later_command(tmp_path, capsys):
+    """A surface of steep and flat halves, which no law of one orientation density represents."""
+    rng = np.random.default_rng(7)
+    z = gaussian_filter(rng.normal(size=(160, 160)), 3.0)
+    z[:, 80:] *= 12.0
+    np.savetxt(tmp_path / "scan.csv", 20 * z / z.std(), delimiter=",", fmt="%.9g")
+    out = tmp_path / "out"
+    scan = ["scan", str(tmp_path / "scan.csv"), "--spacing", "20um", "--height-unit", "um"]
+    assert main([*scan, "--out", str(out)]) == 0
+    assert "not estimated" in capsys.readouterr().out
+    about = about_of(out / "surface.toml")
+    assert any("do not use its friction angle" in text for text in about.warnings)
+    assert about.origin["a"].startswith("measured on the scan, standard error")
+    shear = ["shear", str(out / "surface.toml"), "--default-rock", "--to", "1um", "--steps", "3"]
+    assert main([*shear, "--out", str(tmp_path / "shear")]) == 0
+    err = capsys.readouterr().err
+    assert "do not use its friction angle" in err
+    assert "contacts are assumed" in err

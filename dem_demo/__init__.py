@@ -1,7 +1,8 @@
 """Rigid rock blocks in 2-D with a joint law: pymunk finds neighbours, jointlaw pushes.
 
 The reference example of how to embed `jointlaw` in a block code; see docs/embed.md.
-Rooms, each using only those above it: scene, contact, dynamics, output, studies; then the commands.
+Rooms, each using only those above it: scene, contact, dynamics, output, studies, space (statics of
+blocks in space); then the commands.
 """
 
 try:

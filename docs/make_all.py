@@ -80,6 +80,8 @@ PARTS = {
     "energy-gain": Part("docs/measure/energy_gain.py", quoted_in="limits.md theory-incremental.md"),
     # blocks.md
     "shaken-slab": Part("docs/measure/blocks.py shaken-slab", quoted_in="blocks.md"),
+    # space.md
+    "rough-direction": Part("docs/measure/space.py rough-direction", page="space.md"),
     # water.md, blocks.md
     "mean-gap": Part("docs/measure/aperture.py mean-gap", page="water.md"),
     "slide-flow": Part("docs/measure/aperture.py slide", quoted_in="water.md blocks.md"),
@@ -94,6 +96,10 @@ PARTS = {
             "strength-surface.png": "strength-surface.png",
         },
         quoted_in="why.md",
+    ),
+    "space": Part(
+        "docs/draw/space.py FOLDER",
+        pictures={"wedge.png": "wedge.png", "face-contact.png": "face-contact.png"},
     ),
     "axes": Part("docs/draw/axes.py FOLDER", pictures={"axes.png": "axes.png"}),
     "shear": Part(
@@ -149,6 +155,7 @@ PARTS = {
         is_timed=True,
     ),
     "blocks-cost": Part("docs/measure/blocks.py step-cost", page="blocks.md", is_timed=True),
+    "space-cost": Part("docs/measure/space.py cost", page="space.md", is_timed=True),
     "heap": Part("docs/measure/blocks.py heap FOLDER", quoted_in="blocks.md", is_timed=True),
     "yade": Part("docs/measure/hosts.py yade", page="particles.md", is_timed=True),
     "lammps": Part("docs/measure/hosts.py lammps FOLDER", page="particles.md", is_timed=True),

@@ -106,6 +106,7 @@ def _files_that_the_reader_has(monkeypatch):
     z = gaussian_filter(np.random.default_rng(0).standard_normal((400, 400)), 5)
     np.savetxt("scan.csv", 400 * z, delimiter=",")
     Path("block.toml").write_text(blocks("docs/blocks.md", "toml")[0])
+    Path("my-rock.toml").write_text(blocks("docs/space.md", "toml")[0])
 
 
 @pytest.mark.slow

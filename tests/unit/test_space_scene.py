@@ -1,6 +1,7 @@
 """Scenes in space from their files: shapes, rocks, laws of joints, and errors in plain words."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from scene_text import ROCK, block, coulomb
 
 from dem_demo.scene import Files
 from dem_demo.scene import parse as parse_in_plane
+from dem_demo.space.keys import SCENE, not_there_yet
 from dem_demo.space.read import parse
 from dem_demo.space.scene import SpaceScene
 from dem_demo.space.statics import Statics
@@ -158,6 +160,24 @@ def test_an_anisotropic_law_needs_a_rough_direction():
     text = 'law = "rough"\n' + LAWS + ANISOTROPIC + MASS + sets
     assert "set[0].rough is missing" in error_of(text)
     parse(text.replace("dip = 40\n", "dip = 40\nrough = 10\n"))
+
+
+def declared_keys(rules):
+    """Names of all keys that a scene in space may have, of its tables too."""
+    for name, rule in rules.items():
+        table = rule[0] if isinstance(rule, list) else rule
+        if isinstance(table, dict):
+            yield from declared_keys(table)
+        elif rule is not not_there_yet:
+            yield name.removesuffix("!")
+
+
+def test_the_page_has_a_row_for_each_key():
+    page = (Path(__file__).parents[2] / "docs" / "space.md").read_text(encoding="utf-8")
+    rows = page.partition("## The keys of a scene in space")[2].partition("\n## ")[0]
+    documented = {*re.findall(r"`(\w+)`", rows)}
+    assert not {*declared_keys(SCENE)} - documented
+    assert documented - {*declared_keys(SCENE)} <= {"like", "plane", "pressure", "set", "c"}
 
 
 def test_blocks_that_overlap_as_drawn_are_named():

@@ -1,0 +1,81 @@
+"""Blocks in space: factor of safety by rough direction, and what cutting and statics cost.
+
+python docs/measure/space.py rough-direction
+python docs/measure/space.py cost
+"""
+
+import os
+import time
+import tracemalloc
+
+os.environ |= {"JOINTLAW_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # read when numpy is loaded
+
+import numpy as np
+from common import print_table, run_command
+
+from dem_demo.scene import read_tables
+from dem_demo.scene.read import read_source
+from dem_demo.space import Statics, load
+from dem_demo.space.contacts import Surfaces, find_contacts
+from dem_demo.space.cutting import PlaneSet, cut_rock
+from dem_demo.space.read import build
+from dem_demo.space.solids import box
+from dem_demo.space.strength import factor_of_safety
+
+ANGLES = range(0, 91, 15)  # degrees from the line of intersection
+SETS = [
+    PlaneSet(35.0, 160.0, 1.0, "joint", scatter=0.3),
+    PlaneSet(70.0, 60.0, 1.1, "joint", scatter=0.3),
+    PlaneSet(75.0, 300.0, 1.1, "joint", scatter=0.3),
+]
+
+
+def wedge_factor(anisotropy: float, angle: float) -> float | None:
+    """Factor of safety of the scene wedge with another c, its rough direction turned (degrees)."""
+    text, where, files = read_source("wedge")
+    data = read_tables(text, where)
+    data["laws"]["joint"]["orientation"]["c"] = anisotropy
+    for number, sign in ((0, 1.0), (1, -1.0)):  # symmetric about the line
+        data["rock"][0]["set"][number]["rough"] += sign * angle
+    return factor_of_safety(Statics(build(data, where, files)), tolerance=0.002)
+
+
+def rough_direction() -> None:
+    """Print the factor of safety of a wedge by its rough direction."""
+    rows = [
+        [f"{angle}°", *(f"{wedge_factor(c, float(angle)):.3f}" for c in (0.0, 0.3))]
+        for angle in ANGLES
+    ]
+    print_table(["rough direction from the line", "c = 0", "c = 0.3"], rows)
+
+
+def cost() -> None:
+    """Print CPU times on one thread, and the memory of a contact point."""
+    rows = []
+
+    def timed(what, work):
+        start = time.process_time()
+        result = work()
+        rows.append([what, f"{time.process_time() - start:.2g} s"])
+        return result
+
+    rock = box([10.0, 10.0, 10.0])
+    solids = timed("cutting a rock into 1116 blocks", lambda: cut_rock(rock, SETS, 1, 0.2).solids)
+    surfaces = timed("setting up their surfaces", lambda: Surfaces(solids, np.ones(len(solids))))
+    reach = np.full(len(solids), 2e-3)
+    points = timed("finding their contacts", lambda: find_contacts(surfaces, reach, 0.1))
+    rows.append(["contact points of them", str(len(points.area))])
+    scene = timed("reading and cutting `slope-3d`", lambda: load("slope-3d"))
+    tracemalloc.start()
+    statics = Statics(scene)
+    memory = tracemalloc.get_traced_memory()[0] / len(statics.points.area)
+    tracemalloc.stop()
+    rows.append(["memory of its geometry, a contact point", f"{memory / 1e3:.2g} kB"])
+    free = int(statics.is_free.sum())
+    timed(f"equilibrium of its {free} free blocks", statics.solve)
+    timed("its factor of safety", lambda: factor_of_safety(statics))
+    print_table(["", "CPU time, one thread"], rows)
+
+
+if __name__ == "__main__":
+    run_command(__doc__, rough_direction, cost)

@@ -4,6 +4,7 @@ restarts; bonded and pulled apart, where the joint exists until the bond fails."
 import numpy as np
 import pytest
 from lammps_host import HEAD, LAWS, T, dumped, run
+from scipy.spatial.transform import Rotation
 
 R = 1e-2
 DENSITY = 2600.0
@@ -58,6 +59,7 @@ def in_python(law):
     w = W.copy()
     joint = law.joint()
     axis2 = None
+    last = None  # separation in the last step
     area = np.pi * R * R
     F = np.zeros((2, 3))
     T = np.zeros((2, 3))
@@ -78,16 +80,21 @@ def in_python(law):
             axis2 = np.eye(3)[k] - n[k] * n
             axis2 /= np.linalg.norm(axis2)
         if axis2 is not None:
-            slide = v[1] - v[0] - np.cross(arm * (w[0] + w[1]), n)
-            twist = 0.5 * DT * ((w[0] + w[1]) @ n)
-            axis2 = axis2 + twist * np.cross(n, axis2) - (axis2 @ n) * n
+            # the pair rotates with the mean spin; the spheres are equal, so their spins cancel else
+            rotation = Rotation.from_rotvec(0.5 * DT * (w[0] + w[1]))
+            slip = DT * (v[1] - v[0] - np.cross(arm * (w[0] + w[1]), n))  # they touch in this step
+            if last is not None:
+                slip = d - rotation.apply(last)
+            last = d
+            axis2 = rotation.apply(axis2)
+            axis2 -= (axis2 @ n) * n
             axis2 /= np.linalg.norm(axis2)
             axis3 = np.cross(axis2, n)
-            step = [closure - joint.delta[0], DT * (slide @ axis2), DT * (slide @ axis3)]
-            f, _ = joint.update(step)
+            f, _ = joint.update([closure - joint.delta[0], slip @ axis2, slip @ axis3])
             if closure < 0 and not f.any():
                 joint = law.joint()
                 axis2 = None
+                last = None
             else:
                 F[1] = area * (f[0] * n - f[1] * axis2 - f[2] * axis3)
                 F[0] = -F[1]

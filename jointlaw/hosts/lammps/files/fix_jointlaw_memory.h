@@ -12,7 +12,8 @@
 //   atom grows with it and is kept when joints end; sorting swaps pointers instead of copying. It is
 //   aligned to cache lines, because the pair style prefetches states of the next atom.
 // - A partner is identified by its atom ID (or its molecule ID), which is valid on every process and
-//   after a restart; an index of an atom is not. Commands that renumber atoms are detected.
+//   after a restart; an index of an atom is not. Commands that renumber atoms are detected, and so are
+//   new atoms, which may have the ID of a deleted atom (`renumbered`).
 // - LAMMPS allocates buffers for migration in advance. `maxexchange` must cover the atom with most
 //   joints at any moment, since atoms also migrate between runs (`reserve_exchange`).
 // - Integers are stored in the doubles of a state by their bits, since IDs may exceed 2^53.
@@ -133,16 +134,23 @@ class FixJointlawMemory : public Fix {
   // Atoms also migrate between runs, for example when write_restart starts
   void reserve_exchange(int joints) { maxexchange = std::max(maxexchange, 2 + joints * size); }
 
-  // Whether an atom has another ID than in the last step: partners are identified by ID
-  bool renumbered()
+  // Whether an atom has another ID than at the last call. `appeared`: the IDs of atoms on all processes
+  // that are new since then, if there are joints whose partners they might replace
+  bool renumbered(std::vector<tagint> &appeared)
   {
-    int mine = 0, any = 0;
+    int mine[3] = {0, 0, 0}, any[3];    // other IDs, new atoms, joints
+    std::vector<tagint> new_here;
     for (int i = 0; i < atom->nlocal; i++) {
-      mine = mine || (of[i].tag && of[i].tag != atom->tag[i]);
+      mine[0] = mine[0] || (of[i].tag && of[i].tag != atom->tag[i]);
+      mine[2] = mine[2] || of[i].n;
+      if (!of[i].tag) new_here.push_back(atom->tag[i]);
       of[i].tag = atom->tag[i];
     }
-    MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, world);
-    return any;
+    mine[1] = !new_here.empty();
+    MPI_Allreduce(mine, any, 3, MPI_INT, MPI_MAX, world);
+    appeared.clear();
+    if (any[1] && any[2]) gather(new_here, appeared);
+    return any[0];
   }
 
   void grow_arrays(int nmax) override
@@ -217,6 +225,19 @@ class FixJointlawMemory : public Fix {
     double bytes = of.size() * sizeof(AtomJoints);
     for (const auto &own : of) bytes += own.bytes();
     return bytes;
+  }
+
+ private:
+  // Append the IDs of all processes to `all`
+  void gather(const std::vector<tagint> &mine, std::vector<tagint> &all)
+  {
+    int n = static_cast<int>(mine.size());
+    std::vector<int> counts(comm->nprocs), starts(comm->nprocs + 1, 0);
+    MPI_Allgather(&n, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+    for (int p = 0; p < comm->nprocs; p++) starts[p + 1] = starts[p] + counts[p];
+    all.resize(starts[comm->nprocs]);
+    MPI_Allgatherv(mine.data(), n, MPI_LMP_TAGINT, all.data(), counts.data(), starts.data(),
+                   MPI_LMP_TAGINT, world);
   }
 };
 

@@ -10,6 +10,13 @@
 // neighbour list with newton on, so each state exists once and migrates with its owner
 // (fix_jointlaw_memory.h).
 //
+// A joint belongs to one law and two bodies, which its record holds. Where `set type` gives the pair
+// another law, or an atom ID is used again, the joint ends and a new one begins (belongs_to). The
+// setup of a run is not a step: joints whose atoms have not moved since their last step keep their
+// states, and their forces are computed from these (jlaw_traction). Displacement increments follow
+// from the positions at two steps, not from velocities, so that motion without velocity (fix deform,
+// displace_atoms) shears joints, too.
+//
 // A step has three stages. For each owner the contacts are found, and their increments are appended to
 // a list (find_*_contacts, prepare_step). After about GROUP joints the law advances all of them in one
 // call that is vectorised over joints (perform_steps). Then forces are added to the atoms
@@ -66,6 +73,23 @@ static Vector perpendicular(const Vector &n)
   return unit(sum(axis, -n[k], n));
 }
 
+// Continue an FNV-1a hash, which begins with HASH_START, by a text
+static constexpr uint64_t HASH_START = 0xCBF29CE484222325ULL;
+static uint64_t hashed(uint64_t value, const char *text)
+{
+  for (; *text; text++) value = (value ^ static_cast<unsigned char>(*text)) * 0x100000001B3ULL;
+  return value;
+}
+// A vector after a rotation by a rotation vector; exact to 1e-13 up to 0.5 rad
+static Vector rotated(const Vector &a, const Vector &rotation)
+{
+  const double x = dot(rotation, rotation);
+  const double sine = 1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0 - x * (1.0 / 5040.0 - x / 362880.0)));
+  const double cosine = 0.5 - x * (1.0 / 24.0 - x * (1.0 / 720.0 - x * (1.0 / 40320.0 - x / 3628800.0)));
+  const Vector across = cross(rotation, a);
+  return sum(sum(a, sine, across), cosine, cross(rotation, across));
+}
+
 class PairJointlaw : public Pair {
  public:
   PairJointlaw(LAMMPS *);
@@ -86,19 +110,22 @@ class PairJointlaw : public Pair {
   struct Law {
     std::string file;
     jlaw_law *law;
+    int64_t id;    // hash of the fingerprint
   };
   // A contact or possible contact of owner i; the normal n points from i to j
   struct Contact {
     int i, j;
     tagint key;    // identifies the partner
     double closure, area;
-    Vector n, arm_i, arm_j;    // from the centres to the contact
+    Vector n, arm_i, arm_j;    // arms: from the centres to the contact
+    Vector separation;         // from the centre of i to the centre of j
   };
   // The step of a joint
   struct Step {
     Contact contact;
     const jlaw_law *law;
     int index, flag;    // index in the joints of the owner; index in joint_flags, -1 for a new joint
+    bool is_still;      // of a setup: nothing has moved since the last step of the joint
     Vector slide, axis2, axis3;
   };
   // An owner in this step: its number of joints before it, and the index of their first flag
@@ -115,17 +142,20 @@ class PairJointlaw : public Pair {
     double distance2[3], u[3], v[3];    // in the plane: squared distance, coordinates
     double normal_distance[3];
   };
-  // Numbers of a joint behind its state: key, atom ID and type of the partner; area, axis 2, damping
-  // force
+  // The record of a joint, behind its state: key and atom ID of the partner, key of the owner, law;
+  // area, axis 2, separation of the atoms in the last step, damping force
   enum {
     PARTNER_KEY,
     PARTNER_ID,
-    PARTNER_TYPE,
+    OWNER_KEY,
+    LAW,
     JOINT_AREA,
     AXIS2,
-    DAMPING_FORCE = AXIS2 + 3,
+    SEPARATION = AXIS2 + 3,
+    DAMPING_FORCE = SEPARATION + 3,
     EXTRA_SIZE
   };
+  static constexpr uint64_t RECORD_VERSION = 2;    // of this record, in restart files
   enum { NO_COEFF = -2, NO_LAW = -1 };    // of a pair of types: no pair_coeff; pair_coeff ... NULL
   static constexpr double EXPECTED_STRESS = 1e6;    // Pa, for the time step before the first contact
   enum { CLOSURE, SLIP, NORMAL, SHEAR, SLIDING, STORED, DISSIPATED, AREA, OUTPUTS };
@@ -143,6 +173,8 @@ class PairJointlaw : public Pair {
   std::vector<Opposite> opposites;
   std::vector<Step> steps;
   std::vector<Visit> visits;
+  std::vector<tagint> new_atoms;    // IDs of atoms that appeared since the last step, in order
+  double rounding = 0.0;            // m, of positions between two runs
   std::vector<char> joint_flags;
   std::vector<double> states, increments, tractions, tangents;    // of the steps
   std::vector<double> scratch, stiffness;    // N/m, sum over the joints of each atom
@@ -154,10 +186,25 @@ class PairJointlaw : public Pair {
   bool has_local_output = false;
 
   double number(int &, int, char **, const char *);
-  const jlaw_law *law_between(int type_i, int type_j) const
+  const Law *law_between(int type_i, int type_j) const
   {
     const int index = law_of[type_i * (atom->ntypes + 1) + type_j];
-    return index < 0 ? nullptr : laws[index].law;
+    return index < 0 ? nullptr : &laws[index];
+  }
+  const jlaw_law *law_of_record(const double *extra) const
+  {
+    for (const Law &law : laws)
+      if (law.id == to_integer(extra[LAW])) return law.law;
+    return nullptr;
+  }
+  bool is_new_atom(int i) const
+  {
+    return !new_atoms.empty() && std::binary_search(new_atoms.begin(), new_atoms.end(), atom->tag[i]);
+  }
+  bool belongs_to(const double *extra, const Contact &c, const Law *law) const
+  {
+    return to_integer(extra[LAW]) == law->id && to_integer(extra[OWNER_KEY]) == key_of(c.i)
+        && !is_new_atom(c.j);
   }
   double area_of(int i, int j) const
   {
@@ -169,7 +216,8 @@ class PairJointlaw : public Pair {
   void find_sphere_contacts(int, const int *, int);
   void find_body_contacts(int, const int *, int);
   bool surface_distance(const Opposite &, double, double &) const;
-  void prepare_step(const Contact &);
+  bool find_slip(const Contact &, const double *, const int *, int, const Vector &, double, Vector &) const;
+  void prepare_step(const Contact &, const int *, int);
   void perform_steps();
   void apply_forces(const Step &, double *, const double *, const double *);
   void end_joint(int, int, bool);
@@ -180,6 +228,7 @@ class PairJointlaw : public Pair {
   void collect_outputs();
   std::array<double, 1 + OUTPUTS> joint_outputs(const double *, const jlaw_law *) const;
   uint64_t hash_laws() const;
+  void register_atoms();
 };
 
 PairJointlaw::PairJointlaw(LAMMPS *lmp) : Pair(lmp)
@@ -307,7 +356,7 @@ void PairJointlaw::coeff(int narg, char **arg)
       int read = law != nullptr, all = 0;
       MPI_Allreduce(&read, &all, 1, MPI_INT, MPI_MIN, world);
       if (!all) error->all(FLERR, "pair_coeff jointlaw: {}", message);
-      laws.push_back({arg[2], law});
+      laws.push_back({arg[2], law, static_cast<int64_t>(hashed(HASH_START, jlaw_fingerprint(law)))});
       if (opening < jlaw_tensile_opening(law))
         error->all(FLERR, "pair_coeff jointlaw: {} has tensile strength up to an opening of {} m, "
                    "but joints are deleted at opening {} m: give pair_style a larger opening", arg[2],
@@ -336,12 +385,10 @@ void PairJointlaw::coeff(int narg, char **arg)
 
 // ---------------------------------------------------------------- before a run
 
-uint64_t PairJointlaw::hash_laws() const    // FNV-1a of the fingerprints by pair of types
+uint64_t PairJointlaw::hash_laws() const    // of the fingerprints by pair of types
 {
-  uint64_t value = 0xCBF29CE484222325ULL;
-  for (const int index : law_of)
-    for (const char *c = index < 0 ? "-" : jlaw_fingerprint(laws[index].law); *c; c++)
-      value = (value ^ static_cast<unsigned char>(*c)) * 0x100000001B3ULL;
+  uint64_t value = HASH_START ^ RECORD_VERSION;
+  for (const int index : law_of) value = hashed(value, index < 0 ? "-" : jlaw_fingerprint(laws[index].law));
   return planar ? ~value : value;
 }
 
@@ -468,13 +515,21 @@ void PairJointlaw::list_candidates()
   first[list->inum] = static_cast<int>(candidates.size());
 }
 
+// Note the atoms that appeared since the last step, which may have the ID of a deleted atom
+void PairJointlaw::register_atoms()
+{
+  if (joints_of->renumbered(new_atoms))
+    error->all(FLERR, "pair_style jointlaw: atoms were renumbered, but joints identify their "
+               "partners by ID; use delete_atoms compress no");
+  std::sort(new_atoms.begin(), new_atoms.end());
+  rounding = 1e-14 * std::max({domain->xprd, domain->yprd, domain->zprd});
+}
+
 void PairJointlaw::compute(int eflag, int vflag)
 {
   ev_init(eflag, vflag);
   if (neighbor->ago == 0) list_candidates();
-  if (update->setupflag && joints_of->renumbered())
-    error->all(FLERR, "pair_style jointlaw: atoms were renumbered, but joints identify their "
-               "partners by ID; use delete_atoms compress no");
+  if (neighbor->ago == 0 || update->setupflag) register_atoms();
   const bool check = update->setupflag || update->ntimestep % 100 == 0;
   stiffness.assign(check ? atom->nlocal + atom->nghost : 0, 0.0);
   if (eflag_either) pvector[0] = pvector[1] = 0.0;
@@ -494,6 +549,7 @@ void PairJointlaw::compute(int eflag, int vflag)
     if (steps.size() >= GROUP) perform_steps();
   }
   perform_steps();
+  new_atoms.clear();
   if (check) check_joints();    // collective: also on processes without atoms
   if (eflag_either) {
     const double *sums = joints_of->sums;
@@ -523,7 +579,8 @@ void PairJointlaw::find_sphere_contacts(int i, const int *partners, int count)
     c.area = area_of(i, j);
     c.arm_i = times(radius - 0.5 * (touch - r), c.n);
     c.arm_j = sum(c.arm_i, -1.0, d);
-    prepare_step(c);
+    c.separation = d;
+    prepare_step(c, partners, count);
   }
 }
 
@@ -583,53 +640,98 @@ void PairJointlaw::find_body_contacts(int i, const int *partners, int count)
     c.closure = touch - gap + closure0 - distance;
     c.area = area_of(i, j);
     c.arm_i = times(0.5 * distance, c.n);
-    c.arm_j = sum(c.arm_i, -1.0, sum(vector(atom->x[j]), -1.0, here));
-    prepare_step(c);
+    c.separation = sum(vector(atom->x[j]), -1.0, here);
+    c.arm_j = sum(c.arm_i, -1.0, c.separation);
+    prepare_step(c, partners, count);
   }
 }
 
+// Slip (m) since the last step of a joint: motion of the surface of the partner relative to the surface of
+// the owner. `rotation`: the mean rotation of both, which rotates a contact of spheres without slip.
+// Returns false if it is unknown: another point of a body is opposite, and the last one is no longer a
+// neighbour.
+bool PairJointlaw::find_slip(const Contact &c, const double *extra, const int *partners, int count,
+                             const Vector &rotation, double dt, Vector &slip) const
+{
+  const Vector wi = vector(atom->omega[c.i]), wj = vector(atom->omega[c.j]);
+  const Vector last = vector(extra + SEPARATION);
+  if (!planar) {
+    const double difference = 0.5 * (dot(c.arm_i, c.n) + dot(c.arm_j, c.n));
+    slip = sum(c.separation, -1.0, rotated(last, rotation));
+    slip = sum(slip, -dt * difference, cross(sum(wi, -1.0, wj), c.n));
+    return true;
+  }
+  Vector separation = c.separation;
+  if (atom->tag[c.j] != to_integer(extra[PARTNER_ID])) {
+    const auto is_last = [&](int k) { return atom->tag[k] == to_integer(extra[PARTNER_ID]); };
+    const int *j = std::find_if(partners, partners + count, is_last);
+    if (j == partners + count) return false;
+    separation = sum(vector(atom->x[*j]), -1.0, vector(atom->x[c.i]));
+  }
+  const Vector spin = sum(cross(wj, c.arm_j), -1.0, cross(wi, c.arm_i));
+  slip = sum(sum(separation, -1.0, last), dt, spin);
+  return true;
+}
+
 // Append the step of a joint: its increments, from the geometry of the contact
-void PairJointlaw::prepare_step(const Contact &c)
+void PairJointlaw::prepare_step(const Contact &c, const int *partners, int count)
 {
   const int i = c.i, j = c.j;
+  const bool is_setup = update->setupflag;
+  const double dt = is_setup ? 0.0 : update->dt;    // a setup is not a time step
   AtomJoints &own = joints_of->of[i];
-  const jlaw_law *law = law_between(atom->type[i], atom->type[j]);
-  int index = 0;
-  while (index < own.n && to_integer(own.joint(index, size)[rows + PARTNER_KEY]) != c.key) index++;
-  const bool fresh = index == own.n;
-  if (fresh) {
-    // bodies that touch at the start of a run do so except for rounding, and may have a bond
-    const double touch = jlaw_has_damage(law) && update->setupflag ? -1e-9 * sqrt(dot(c.arm_i, c.arm_i)) : 0.0;
-    if (!(c.closure > touch)) return;
-    own.resize(index + 1, size);
-    double *extra = own.joint(index, size) + rows;
-    extra[PARTNER_KEY] = from_integer(c.key);
-    extra[JOINT_AREA] = c.area;
-    const Vector axis = perpendicular(c.n);
-    std::copy(axis.begin(), axis.end(), extra + AXIS2);
-    if (!update->setupflag) jlaw_break_bond(law, own.joint(index, size));    // touch again after separation
-  }
-  const int flag = fresh ? -1 : visits.back().first_flag + index;
-  if (!fresh) joint_flags[flag] = IN_CONTACT;
-  double *state = own.joint(index, size), *extra = state + rows;
-  extra[PARTNER_ID] = from_integer(atom->tag[j]);
-  extra[PARTNER_TYPE] = atom->type[j];
-
-  const double dt = update->setupflag ? 0.0 : update->dt;    // a setup is not a time step
+  const Law *law = law_between(atom->type[i], atom->type[j]);
   const Vector wi = vector(atom->omega[i]), wj = vector(atom->omega[j]);
   const Vector vi = sum(vector(atom->v[i]), 1.0, cross(wi, c.arm_i));
   const Vector vj = sum(vector(atom->v[j]), 1.0, cross(wj, c.arm_j));
   const Vector slide = sum(vj, -1.0, vi);    // of the surface of j relative to i
-  // axis 2 remains perpendicular to the normal and rotates about it with the mean spin of both bodies
+  const Vector rotation = times(0.5 * dt, sum(wi, 1.0, wj));    // in the step, the mean of both
+  Vector slip = times(dt, slide);
+  int index = 0;
+  while (index < own.n && to_integer(own.joint(index, size)[rows + PARTNER_KEY]) != c.key) index++;
+  if (index < own.n) {
+    const double *extra = own.joint(index, size) + rows;
+    // the joint of another law or other bodies is not found again, and ends after this step
+    if (!belongs_to(extra, c, law)) index = own.n;
+    else if (!find_slip(c, extra, partners, count, rotation, dt, slip) && is_setup) index = own.n;
+  }
+  const bool fresh = index == own.n;
+  if (fresh) {
+    // bodies that touch at the start of a run do so except for rounding, and may have a bond
+    const double touch = jlaw_has_damage(law->law) && is_setup ? -1e-9 * sqrt(dot(c.arm_i, c.arm_i)) : 0.0;
+    if (!(c.closure > touch)) return;
+    own.resize(index + 1, size);
+    double *extra = own.joint(index, size) + rows;
+    extra[PARTNER_KEY] = from_integer(c.key);
+    extra[OWNER_KEY] = from_integer(key_of(i));
+    extra[LAW] = from_integer(law->id);
+    const Vector axis = perpendicular(c.n);
+    std::copy(axis.begin(), axis.end(), extra + AXIS2);
+    if (!is_setup) jlaw_break_bond(law->law, own.joint(index, size));    // touch again after separation
+  }
+  const int flag = fresh ? -1 : visits.back().first_flag + index;
+  if (!fresh) joint_flags[flag] = IN_CONTACT;
+  double *state = own.joint(index, size), *extra = state + rows;
+  extra[JOINT_AREA] = c.area;
   Vector axis2 = vector(extra + AXIS2);
-  const double twist = 0.5 * dt * (dot(wi, c.n) + dot(wj, c.n)), out = dot(axis2, c.n);
-  axis2 = unit(sum(sum(axis2, twist, cross(c.n, axis2)), -out, c.n));
+  slip = sum(slip, -dot(slip, c.n), c.n);
+  const bool is_still = is_setup && !fresh && fabs(c.closure - state[0]) <= rounding
+      && dot(slip, slip) <= rounding * rounding;
+  if (is_still) {
+    for (int k = 0; k < 3; k++) increments.push_back(0.0);
+    steps.push_back({c, law->law, index, flag, is_still, slide, axis2, cross(axis2, c.n)});
+    return;
+  }
+  // axis 2 rotates with the bodies (in a plane about the normal only) and follows the normal
+  const Vector turn = planar ? times(dot(rotation, c.n), c.n) : rotation;
+  axis2 = rotated(axis2, turn);
+  axis2 = unit(sum(axis2, -dot(axis2, c.n), c.n));
   const Vector axis3 = cross(axis2, c.n);    // axis 1 is -n: motion of j into i closes
+  extra[PARTNER_ID] = from_integer(atom->tag[j]);
   std::copy(axis2.begin(), axis2.end(), extra + AXIS2);
-
-  for (const double d : {c.closure - state[0], dt * dot(slide, axis2), dt * dot(slide, axis3)})
-    increments.push_back(d);
-  steps.push_back({c, law, index, flag, slide, axis2, axis3});
+  std::copy(c.separation.begin(), c.separation.end(), extra + SEPARATION);
+  for (const double d : {c.closure - state[0], dot(slip, axis2), dot(slip, axis3)}) increments.push_back(d);
+  steps.push_back({c, law->law, index, flag, is_still, slide, axis2, axis3});
 }
 
 // Advance all joints in the list, in groups of one law; then delete ended joints
@@ -642,13 +744,18 @@ void PairJointlaw::perform_steps()
   for (size_t first = 0, n; first < steps.size(); first += n) {
     const jlaw_law *law = steps[first].law;
     const size_t bytes = jlaw_state_size(law) * sizeof(double);
+    const bool is_still = steps[first].is_still;
     const auto of = [&](size_t k) {
       return joints_of->of[steps[first + k].contact.i].joint(steps[first + k].index, size);
     };
-    for (n = 0; first + n < steps.size() && steps[first + n].law == law; n++)
+    const auto is_in_group = [&](const Step &step) { return step.law == law && step.is_still == is_still; };
+    for (n = 0; first + n < steps.size() && is_in_group(steps[first + n]); n++)
       memcpy(states.data() + rows * n, of(n), bytes);
     double *d = increments.data() + 3 * first, *F = tractions.data(), *C = tangents.data();
-    const size_t done = jlaw_update_many(law, states.data(), rows, d, F, damps ? C : nullptr, n);
+    if (is_still && damps) jlaw_update_many(law, states.data(), rows, d, F, C, n);    // of a copy, for C
+    for (size_t k = 0; is_still && k < n; k++) jlaw_traction(law, of(k), F + 3 * k);
+    const size_t done =
+        is_still ? n : jlaw_update_many(law, states.data(), rows, d, F, damps ? C : nullptr, n);
     if (done < n) {
       const Contact &c = steps[first + done].contact;
       char message[JLAW_MESSAGE];
@@ -657,7 +764,7 @@ void PairJointlaw::perform_steps()
                  atom->tag[c.j], update->ntimestep, message);
     }
     for (size_t k = 0; k < n; k++) {
-      memcpy(of(k), states.data() + rows * k, bytes);
+      if (!is_still) memcpy(of(k), states.data() + rows * k, bytes);
       apply_forces(steps[first + k], of(k), F + 3 * k, C + 9 * k);
     }
   }
@@ -735,8 +842,7 @@ void PairJointlaw::end_joint(int i, int index, bool deleted_under_load)
 {
   AtomJoints &own = joints_of->of[i];
   const double *state = own.joint(index, size), *extra = state + rows;
-  const jlaw_law *law = law_between(atom->type[i], static_cast<int>(extra[PARTNER_TYPE]));
-  if (law) {
+  if (const jlaw_law *law = law_of_record(extra)) {
     double *sums = joints_of->sums;
     sums[FixJointlawMemory::ENDED_DISSIPATION] += extra[JOINT_AREA] * jlaw_dissipated_energy(law, state);
     const double stored = deleted_under_load ? extra[JOINT_AREA] * jlaw_stored_energy(law, state) : 0.0;
@@ -757,8 +863,8 @@ double PairJointlaw::expected_frequency_squared() const
   for (int type = 1; type <= atom->ntypes; type++) {
     double stiff = 0.0;
     for (int other = 1; other <= atom->ntypes; other++)
-      if (const jlaw_law *law = law_between(type, other))
-        stiff = std::max(stiff, jlaw_max_stiffness(law, closure_under(law, EXPECTED_STRESS)));
+      if (const Law *pair = law_between(type, other))
+        stiff = std::max(stiff, jlaw_max_stiffness(pair->law, closure_under(pair->law, EXPECTED_STRESS)));
     for (int i = 0; i < atom->nlocal; i++)
       if (atom->type[i] == type)
         max_squared = std::max(max_squared, frequency_squared(area_of(i, i) * stiff, atom->rmass[i]));
@@ -786,7 +892,7 @@ void PairJointlaw::check_joints()
   const double lost = joints_of->deleted_under_load();
   if (lost > warned_count && comm->me == 0)
     error->warning(FLERR, "pair_style jointlaw: {} joints under load were deleted (opened by more "
-                   "than {} m, slid off or lost their partner)", lost - warned_count, opening);
+                   "than {} m, slid off, lost their partner or got another law)", lost - warned_count, opening);
   warned_count = lost;
 }
 
@@ -811,10 +917,9 @@ void PairJointlaw::report_time_step(bool touching)
 std::array<double, 1 + PairJointlaw::OUTPUTS>
 PairJointlaw::joint_outputs(const double *state, const jlaw_law *law) const
 {
-  const double *extra = state + rows, zero[3] = {0.0, 0.0, 0.0};
+  const double *extra = state + rows;
   double F[3], fractions[3];
-  std::vector<double> copy(state, state + rows);
-  jlaw_update(law, state, copy.data(), zero, F, nullptr, nullptr, 0);
+  jlaw_traction(law, state, F);
   jlaw_contact_fractions(law, state, fractions);
   return {extra[PARTNER_ID], state[0], hypot(state[1], state[2]), F[0], hypot(F[1], F[2]), fractions[0],
           extra[JOINT_AREA] * jlaw_stored_energy(law, state), extra[JOINT_AREA] * jlaw_dissipated_energy(law, state),
@@ -832,8 +937,7 @@ void PairJointlaw::collect_outputs()
     const AtomJoints &own = joints_of->of[i];
     for (int k = 0; k < own.n; k++) {
       const double *state = own.joint(k, size);
-      const int type = static_cast<int>(state[rows + PARTNER_TYPE]);
-      outputs[i].push_back(joint_outputs(state, law_between(atom->type[i], type)));
+      outputs[i].push_back(joint_outputs(state, law_of_record(state + rows)));
     }
     max_joints = std::max(max_joints, own.n);
   }

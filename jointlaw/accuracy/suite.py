@@ -17,6 +17,12 @@ Excursions are random paths: four to ten legs between corners with closures from
 them at a stress of S/2 to S) and shears up to R, every second path smooth. Every eighth slips as
 `far` does, at the closure of S/20 to S/2; one slip test at random stress and azimuth is added for
 every sixteen. The generator has a fixed seed, so that every resolution follows the same paths.
+
+Dilated paths are random paths of joints that are open and pressed by their slopes alone: three to
+six legs, sheared to 0.3 to 10 R (three mating lengths at most) as they open, so that few facets,
+the steep ones that the shear closes, bear the load. The closures of a path are shifted together
+until its largest normal stress is S/2 to S.
+
 A law without mating length slips by 30 R in the slip tests. At a constant closure a longer slip
 would end at many times the stress S; at a constant stress a law that jams, atan(mu) + 90 deg/a
 above 88 degrees, slips without end, and has no slip tests.
@@ -55,6 +61,9 @@ STEPS = 120  # of each path
 MAX_SLIP_AT_CONSTANT_CLOSURE = 3.0  # R
 _JAMMING_ANGLE = 88.0  # degrees: a law with a larger friction angle has no slip tests
 _EXCURSION_SEED = 8
+_DILATED_SEED = 28
+_DILATED_SHEAR = (0.3, 10.0)  # R, of the farthest corner, but for the mating length
+_SHIFT_ITERATIONS = 20  # bisections of the shift of closures: to 1e-6 of the first bracket
 _SLIP_SEED = 18
 
 
@@ -128,11 +137,14 @@ class Suite:
 
 
 @lru_cache(maxsize=16)
-def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
+def standard_suite(
+    law: JointLaw, best: Resolution | None = None, excursions: int = 0, dilated: int = 0
+) -> Suite:
     """The standard paths of a law with their reference solution.
 
     best: resolution of the reference solution; None takes `reference_resolution`.
     excursions: number of random paths, which follow the standard ones.
+    dilated: number of dilated paths, which follow the excursions; none for a law of closure only.
 
     Convergence is of second order, so the error of the reference is about 0.8 of its `uncertainty`.
     """
@@ -144,8 +156,12 @@ def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: in
         points = np.concatenate([points, _random_excursions(law, stress, excursions)], axis=1)
         at_constant_stress = np.append(at_constant_stress, np.zeros(excursions, bool))
         names += tuple(f"excursion {i + 1}" for i in range(excursions))
-    d = np.diff(points, axis=0, prepend=0.0)
     coarse = replace(law, resolution=scale_resolution(best, 1 / 2))
+    if dilated and not law.closure_only:
+        points = np.concatenate([points, _dilated_paths(coarse, stress, dilated)], axis=1)
+        at_constant_stress = np.append(at_constant_stress, np.zeros(dilated, bool))
+        names += tuple(f"dilated {i + 1}" for i in range(dilated))
+    d = np.diff(points, axis=0, prepend=0.0)
     d = _control_stress(coarse, d, at_constant_stress, stress)
     slip_results = None
     slip_tests = standard_slip_tests(law.tables.dim)
@@ -279,6 +295,51 @@ def _random_excursions(law: JointLaw, stress: float, count: int) -> Array:
             PchipInterpolator(times, corners)(s) if is_smooth else _legs(s, times, *corners.T)
         )
     return R * np.stack(paths, axis=1)[:, :, : law.tables.dim]
+
+
+def _dilated_paths(law: JointLaw, stress: float, count: int) -> Array:
+    """Points (steps, count, dim) in m of reproducible random paths of open, sheared joints.
+
+    law: at a coarse resolution, which finds the closures; stress: S/2 in Pa.
+    """
+    rng = np.random.default_rng(_DILATED_SEED)
+    R = law.closure_range
+    s = np.arange(1, STEPS + 1) / STEPS
+    farthest = max_slip(law.mating_length, R) / R
+    paths = []
+    for _ in range(count):
+        legs = int(rng.integers(3, 7))
+        size = min(float(np.exp(rng.uniform(*np.log(_DILATED_SHEAR)))), farthest)
+        shear = size * np.append(0.0, np.sqrt(rng.random(legs)))
+        azimuth = rng.uniform(0.0, 2.0 * np.pi, legs + 1)
+        closure = np.append(0.0, rng.uniform(-0.2, 1.0, legs))
+        corners = np.stack([closure, shear * np.cos(azimuth), shear * np.sin(azimuth)], axis=-1)
+        paths.append(_legs(s, np.linspace(0.0, 1.0, legs + 1), *corners.T))
+    points = R * np.stack(paths, axis=1)[:, :, : law.tables.dim]
+    return _shift_to_stress(law, points, stress * rng.uniform(1.0, 2.0, count))
+
+
+def _shift_to_stress(law: JointLaw, points: Array, stress: Array) -> Array:
+    """Shift the closures of paths so that their largest normal stress becomes a given one.
+
+    points: (steps, paths, dim) in m; stress: (paths,) in Pa. The shift of a path grows over its
+    first tenth. Returns the new points.
+    """
+    ramp = np.minimum(np.arange(1, len(points) + 1) / (0.1 * len(points)), 1.0)[:, None]
+    distance = np.abs(points).max(axis=(0, 2))
+    low = -law.tables.closure_per_displacement * distance  # nothing touches
+    high = distance.copy()
+    for _ in range(_SHIFT_ITERATIONS):
+        middle = 0.5 * (low + high)
+        shifted = points.copy()
+        shifted[:, :, 0] += ramp * middle
+        F = tractions(law, np.diff(shifted, axis=0, prepend=0.0))
+        is_high = F[:, :, 0].max(axis=0) > stress
+        low = np.where(is_high, low, middle)
+        high = np.where(is_high, middle, high)
+    points = points.copy()
+    points[:, :, 0] += ramp * low
+    return points
 
 
 def random_slip_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -> Array:

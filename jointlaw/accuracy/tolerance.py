@@ -17,6 +17,7 @@ from .suite import Suite, reference_resolution, scale_resolution, standard_suite
 # on all paths outside the suite, with 0.88 of it at most (docs/measure/random_laws.py)
 SAFETY_MARGIN = 1.75
 EXCURSIONS = 128  # random paths of the suite: the largest errors occur on few of them
+DILATED = 32  # random paths of joints that are open and pressed by their slopes
 _MAX_REFERENCE_SLIDERS = 4  # over the sliders of the usual reference
 _DIRECTIONS = ("u", "phi", "depth")
 _U = _DEPTH = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112)
@@ -43,7 +44,7 @@ def at_tolerance(
         min_closure, max_closure = law.closure(limits).tolist()
         law = replace(law, closure_range=max_closure)
         lowest = min_closure / max_closure
-    resolution, error = find_coarsest_resolution(law, bound, EXCURSIONS, lowest)
+    resolution, error = find_coarsest_resolution(law, bound, EXCURSIONS, lowest, DILATED)
     if resolution is None:
         raise ValueError(
             f"tolerance = {tolerance:g} cannot be met for orientation.a = {law.orientation.a:g}: "
@@ -54,17 +55,17 @@ def at_tolerance(
 
 
 def find_coarsest_resolution(
-    law: JointLaw, bound: float, excursions: int = 0, lowest: float = 1.0
+    law: JointLaw, bound: float, excursions: int = 0, lowest: float = 1.0, dilated: int = 0
 ) -> tuple[Resolution | None, float]:
     """The resolution with the fewest sliders whose error on the suite is at most `bound`.
 
-    excursions: number of random paths of the suite.
+    excursions, dilated: numbers of random and of dilated paths of the suite.
     lowest: smallest closure range over the law's; the bound holds on suites of all ranges between.
 
     Returns the resolution and its error; or None and the smallest error, if no resolution up to the
     reference meets the bound.
     """
-    suites, best = _make_references(law, bound, excursions, lowest)
+    suites, best = _make_references(law, bound, (excursions, dilated), lowest)
     if (reference_error := _expected_error(suites, 1.0)) > bound:
         return None, reference_error
 
@@ -102,13 +103,13 @@ def find_coarsest_resolution(
 
 
 def _make_references(
-    law: JointLaw, bound: float, excursions: int, lowest: float
+    law: JointLaw, bound: float, paths: tuple[int, int], lowest: float
 ) -> tuple[list[Suite], Resolution]:
     """Suites of closure ranges down to `lowest`, and the finest resolution for all of them."""
     count = 1 + math.ceil(math.log(1.0 / lowest, _MAX_RANGE_RATIO))
     ranges = (law.closure_range * np.geomspace(1.0, lowest, count)).tolist()
     references = [
-        _make_reference(replace(law, closure_range=closure_range), bound, excursions)
+        _make_reference(replace(law, closure_range=closure_range), bound, paths)
         for closure_range in ranges
     ]
     u, phi, depth = (max(getattr(r, name) for _, r in references) for name in _DIRECTIONS)
@@ -117,9 +118,12 @@ def _make_references(
     return [suite for suite, _ in references], Resolution(u, phi, depth, lowest_cell)
 
 
-def _make_reference(law: JointLaw, bound: float, excursions: int) -> tuple[Suite, Resolution]:
+def _make_reference(
+    law: JointLaw, bound: float, paths: tuple[int, int]
+) -> tuple[Suite, Resolution]:
     """Reference suite of a law, and its resolution.
 
+    paths: numbers of random and of dilated paths.
     The resolution is refined, in the direction (u, phi or depth) that matters most, by 1.5 times at
     a time, until its own error is at most half of `bound`, or until it would have too many sliders;
     then the error may be larger.
@@ -128,7 +132,7 @@ def _make_reference(law: JointLaw, bound: float, excursions: int) -> tuple[Suite
     max_sliders = _MAX_REFERENCE_SLIDERS * best.sliders
     while finer.sliders <= max_sliders:
         best = finer
-        suite = standard_suite(law, best, excursions)
+        suite = standard_suite(law, best, *paths)
         if _expected_error([suite], 1.0) <= bound / 2:
             break
         # 1.5 times the nodes in the direction with the largest error at two thirds of its nodes

@@ -185,6 +185,32 @@ def test_tolerances_hold_at_all_stresses_of_a_range(name):
         assert error_ratios(adapted, limited, 12, 0.02).max() <= 1.0
 
 
+def test_tolerances_hold_on_dilated_joints():
+    """Open joints pressed by their slopes, sheared to 15 closure ranges of their own stress.
+
+    The paths of the suite end at 10. A resolution for closed joints errs by more on these paths.
+    """
+    law = replace(jl.presets.load("jing-replica"), plane=0.0)
+    stress = (1e3, 5e6)
+    adapted = law.at_tolerance(0.05, stress=stress)
+    rng = np.random.default_rng(11)
+    corners = np.zeros((96, 5, 2))
+    corners[:, 1:, 1] = rng.normal(size=(96, 4)) * 10.0 ** rng.uniform(-2.5, 0.0, (96, 1))
+    corners[:, 1:, 0] = -np.abs(corners[:, 1:, 1]) * rng.uniform(0.05, 0.4, (96, 1))
+    corners *= adapted.closure_range
+    d = np.ascontiguousarray(np.moveaxis(increments(corners, 48), 1, 0))
+    lowest = adapted.resolution.lowest
+    F = tractions(replace(adapted, resolution=jl.Resolution(24, 16, 40, lowest)), d)
+    normal = F[:, :, 0].max(axis=0)
+    own_range = law.closure(np.clip(normal, *stress))
+    counts = (normal >= stress[0]) & (normal <= stress[1])
+    counts &= np.abs(corners[:, :, 1]).max(axis=1) <= 15.0 * own_range
+    assert counts.sum() >= 10
+    assert relative_errors(tractions(adapted, d), F)[counts].max() <= 0.05
+    for_closed = replace(adapted, resolution=jl.Resolution(2, 7, 16, lowest))
+    assert relative_errors(tractions(for_closed, d), F)[counts].max() > 0.05
+
+
 MU = 0.4
 LAM = 1.2
 CLOSURE = 0.7  # of the closure range

@@ -212,6 +212,9 @@ def _describe_in_space(statics: Statics, result: Equilibrium) -> None:
     points = f"{len(statics.points.area)} contact points"
     print(f"{scene.title}: {int(statics.is_free.sum())} free blocks, {contacts}, {points}")
     _print_rocks(scene)
+    if statics.untouched.any():
+        blocks = format_blocks(list_blocks(scene, statics.untouched))
+        print(f"no contact of faces, which alone support a block in space: {blocks}")
     print(f"initial state: {result.verdict.value}")
     _print_unstable(scene, result.verdict.value, result.unstable)
 

@@ -303,6 +303,10 @@ class EquilibriumSearch:
         y, _, _ = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
         return y
 
+    def unbalanced_force(self, y: np.ndarray) -> np.ndarray:
+        """Unbalanced forces and moments (n, dof) in N and N m at displacements y (m,)."""
+        return self.expand(self._unbalanced(y)[0] / self.root)
+
     def _unbalanced(self, y: np.ndarray, can_slide: bool = True) -> tuple[np.ndarray, Stiffness]:
         """Unbalanced forces (m,), and stiffness of joints and bolts, at displacements y (m,)."""
         d = (self.start + self.kinematics @ y).reshape(self.dim, -1).T

@@ -163,6 +163,14 @@ class Statics:
         axis_2[is_default] = turned_from_dip(normal[is_default], angle[is_default])
         return law, axis_2
 
+    @property
+    def untouched(self) -> np.ndarray:
+        """Free blocks (n,) without a contact of faces."""
+        touched = np.zeros(len(self.is_free), bool)
+        touched[self.rows.block_a] = True
+        touched[self.rows.block_b] = True
+        return self.is_free & ~touched
+
     @cached_property
     def scale(self) -> np.ndarray:
         """Motion (n, 6) of a block per unit of a scaled motion; zero for fixed blocks."""
@@ -215,7 +223,7 @@ class Statics:
         y = solution.displacement
         motion = search.expand(y) * self.scale
         d = (search.start + search.kinematics @ y).reshape(3, -1).T
-        unbalanced = search.expand(search._unbalanced(y)[0] / search.root)
+        unbalanced = search.unbalanced_force(y)
         size = np.hypot(
             np.linalg.norm(unbalanced[:, :3], axis=1),
             np.linalg.norm(unbalanced[:, 3:], axis=1) / self.surfaces.radius,

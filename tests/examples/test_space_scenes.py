@@ -8,6 +8,7 @@ from math import cos, radians, sin
 import meshio
 import numpy as np
 import pytest
+from scene_text import block, coulomb
 
 import jointlaw as jl
 from dem_demo.cli import main
@@ -122,3 +123,15 @@ def test_motion_in_space_is_refused(words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(words) == 2
     assert "blocks in space do not move yet" in capsys.readouterr().err
+
+
+def test_check_lists_blocks_that_stand_on_an_edge(tmp_path, capsys):
+    """A prism on its edge: no contact of faces supports it."""
+    edge = [[x, 0.0, 0.5] for x in (-0.5, 0.5)]
+    top = [[x, y, 1.2] for x in (-0.5, 0.5) for y in (-0.7, 0.7)]
+    text = "[laws.joint]\n" + coulomb(0.6) + block("base", box=[4, 4, 1], fixed=True)
+    (tmp_path / "prism.toml").write_text(text + block("prism", corners=edge + top))
+    assert main(["check", str(tmp_path / "prism.toml")]) == 0
+    printed = capsys.readouterr().out
+    assert "no contact of faces, which alone support a block in space: prism (0.00, 0.00" in printed
+    assert "1 block has no static equilibrium: prism" in printed

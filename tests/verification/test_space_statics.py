@@ -246,3 +246,27 @@ def test_the_line_of_intersection_of_symmetric_planes():
     statics = Statics(parse(wedge_text(WEDGES[2], coulomb(FRICTION))))
     points = find_contacts(statics.surfaces, statics.scene.skins, 0.1)
     assert len(points.area) == 6
+
+
+PLAIN = "[laws.joint]\n" + coulomb()
+GLUED = "[laws.joint]\n" + coulomb(0.6, cohesion=1e6, tension=1e6)
+
+
+@pytest.mark.parametrize(
+    ("gravity", "laws", "height", "stable"),
+    [
+        (-9.81, PLAIN, 3.0, False),
+        (0.0, PLAIN, 1.0, True),
+        (9.81, PLAIN, 1.0, False),
+        (9.81, GLUED, 1.0, True),
+        (-9.81, PLAIN, 1.005, True),
+    ],
+    ids=["in the air", "weightless", "pulled off", "glued", "above a gap"],
+)
+def test_a_block_with_little_or_no_support(gravity, laws, height, stable):
+    """A gap within the range of detection closes."""
+    text = lines(gravity=[0, 0, gravity]) + laws + block("free", box=[1, 1, 1], at=[0, 0, height])
+    statics = Statics(parse(text + block("base", box=[1, 1, 1], fixed=True)))
+    assert is_stable(statics) == stable
+    if not stable:
+        assert statics.solve().unstable.tolist() == [True, False]

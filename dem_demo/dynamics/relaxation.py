@@ -73,6 +73,15 @@ class Relaxed(NamedTuple):
     residual: float
 
 
+def is_plain_friction(law: jl.Law) -> bool:
+    """Whether a law is Coulomb's, without tension and without softening after the peak."""
+    if type(law) is not jl.CoulombLaw:  # a subclass may have more elements
+        return False
+    keeps_friction = law.residual_friction in (None, law.friction)
+    keeps_cohesion = law.residual_cohesion in (None, law.cohesion)
+    return law.tension == 0.0 and keeps_friction and keeps_cohesion
+
+
 class Relaxation:
     """Blocks on virgin joints, ready to relax.
 
@@ -127,7 +136,9 @@ class Relaxation:
         self.callbacks: list[Any] = []  # which C holds
         self.zero = np.zeros(1, np.int64)
         self.steps = [self._law_step(one, np.flatnonzero(law == i)) for i, one in enumerate(laws)]
-        relaxed_laws = [self._law_arrays(*step) for step in self.steps]
+        relaxed_laws = [
+            self._law_arrays(one, *step) for one, step in zip(laws, self.steps, strict=True)
+        ]
         self.bolt_points = np.arange(self.n_joints, len(self.area))
         if len(self.bolt_points):
             relaxed_laws.append(bolts.relaxed_law(self.bolt_points, dim))
@@ -152,10 +163,22 @@ class Relaxation:
             batch.advance(step)  # prepares the call of the library
         return batch, step, contact
 
-    def _law_arrays(self, batch: Any, step: jl.Step, contact: np.ndarray) -> RelaxedLaw:
+    def _law_arrays(
+        self, law: jl.Law, batch: Any, step: jl.Step, contact: np.ndarray
+    ) -> RelaxedLaw:
         """Addresses of a step for the compiled relaxation."""
         if not len(contact):
             return RelaxedLaw()
+        if is_plain_friction(law):
+            return RelaxedLaw(
+                contact=contact.ctypes.data,
+                n_joints=len(contact),
+                is_friction=1,
+                normal_stiffness=law.normal_stiffness,
+                shear_stiffness=law.shear_stiffness,
+                friction=law.friction,
+                cohesion=law.cohesion,
+            )
         call = step.call[1]
         if call is None:  # the numpy kernel, such as of a user's own law
             advance: Any = self._advance_in_python(batch, step)

@@ -170,6 +170,11 @@ RELAXED_LAW = {
     "n_joints": Field("long long", "joints of the law"),
     "d": Field("double *", "(n_joints, dim): displacements, m"),
     "F": Field("double *", "(n_joints, dim): tractions, Pa"),
+    "is_friction": Field("long long", "1 for Coulomb's law without tension and softening"),
+    "normal_stiffness": Field("double", "of this law, Pa/m; so are the next ones"),
+    "shear_stiffness": Field("double", "Pa/m"),
+    "friction": Field("double", "coefficient"),
+    "cohesion": Field("double", "Pa"),
 }
 RELAXATION = {
     "n_blocks": Field("long long", "n"),

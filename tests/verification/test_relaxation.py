@@ -17,7 +17,7 @@ from dem_demo.dynamics.equilibrium import (
     equilibrium_displacements,
     static_system,
 )
-from dem_demo.dynamics.relaxation import Relaxation, Verdict
+from dem_demo.dynamics.relaxation import Relaxation, Verdict, is_plain_friction
 from dem_demo.dynamics.search import EquilibriumSearch
 from dem_demo.studies.strength import alone, factor_of_safety, weakened
 
@@ -48,7 +48,8 @@ def test_compiled_forces_are_the_assembled_ones(name, kernel, monkeypatch):
 
 def test_an_error_of_a_law_in_python_passes_through_the_compiled_iterations(monkeypatch):
     monkeypatch.setenv("JOINTLAW_KERNEL", "numpy")
-    search = search_of(parse(on_base(coulomb(0.8), [2.0, 1.0], 20.0)))
+    text = on_base(coulomb(0.8, cohesion=2e4, tension=1e3), [2.0, 1.0], 20.0)  # not plain friction
+    search = search_of(parse(text))
     relaxing = search._relaxation()
 
     def fail(step):
@@ -199,3 +200,53 @@ def test_a_block_under_a_load_that_opens_its_joint_is_unstable():
     text = text.replace('name = "block"\n', 'name = "block"\n' + lines(load=[0.0, 2e4]))
     sim = Simulation(parse(text))
     assert [b.name for b, u in zip(sim.scene.blocks, sim.unstable, strict=True) if u] == ["block"]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("reduction", [1.0, 1.3])
+@pytest.mark.parametrize(("friction", "cohesion"), [(0.6, 0.0), (0.3, 2e4), (np.inf, 0.0)])
+def test_plain_friction_has_the_tractions_of_the_law(dim, reduction, friction, cohesion):
+    """Contact points that are open, stick and slide; the closed form in C against steps of the
+    law's batch, which a residual friction below the peak by rounding calls."""
+    dof = {2: 3, 3: 6}[dim]
+    random = np.random.default_rng(1)
+    k = 60
+    block_a, block_b = random.integers(0, 5, k), 5 + random.integers(0, 5, k)
+    kinematics = random.normal(size=(k, dim, 2 * dof))
+    start = 1e-4 * random.normal(size=(k, dim))
+    y = 1e-5 * random.normal(size=(10, dof))
+    plane = 0.0 if dim == 2 else None
+    forces = []
+    for residual in (None, friction * (1 - 1e-14)):
+        if residual == np.inf:
+            residual = None
+        law = jl.CoulombLaw(1e9, 4e8, friction, cohesion, residual_friction=residual, plane=plane)
+        relaxation = Relaxation(
+            [law], np.zeros(k, int), block_a, block_b, kinematics, np.ones(k), start,
+            np.zeros((10, dof)), np.ones((10, dof)), lambda closure: 0.0 * closure, np.ones(k),
+            reduction,
+        )  # fmt: skip
+        forces.append(relaxation.unbalanced(y))
+        assert bool(relaxation.laws[0].is_friction) == is_plain_friction(law)
+    by_hand = np.zeros((10, dof))
+    both = np.concatenate([y[block_a], y[block_b]], axis=1)
+    u = start + np.einsum("kcm,km->kc", kinematics, both)
+    closed = u[:, 0] > 0
+    normal = 1e9 * u[:, 0] * closed
+    shear = 4e8 * u[:, 1:] / reduction * closed[:, None]
+    size = np.maximum(np.linalg.norm(shear, axis=1), 1e-300)
+    with np.errstate(invalid="ignore"):
+        limit = cohesion + np.where(closed, friction * normal, 0.0)
+    limit = np.where(closed, limit, 0.0)
+    slides = closed & (size > limit)
+    assert closed.any()
+    assert not closed.all()
+    assert slides.any() == (friction < np.inf)
+    shear *= np.minimum(1.0, limit / size)[:, None] / reduction
+    traction = np.concatenate([normal[:, None], shear], axis=1)
+    force = np.einsum("kc,kcm->km", traction, kinematics)
+    np.add.at(by_hand, block_a, -force[:, :dof])
+    np.add.at(by_hand, block_b, -force[:, dof:])
+    scale = np.abs(by_hand).max()
+    for found in forces:
+        np.testing.assert_allclose(found, by_hand, atol=1e-11 * scale)

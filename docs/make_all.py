@@ -101,6 +101,12 @@ PARTS = {
         "docs/draw/space.py FOLDER",
         pictures={"wedge.png": "wedge.png", "face-contact.png": "face-contact.png"},
     ),
+    "envelopes": Part(
+        "docs/draw/envelopes.py FOLDER",
+        page="theory-incremental.md",
+        pictures={"envelopes.png": "envelopes.png"},
+        quoted_in="field.md",
+    ),
     "axes": Part("docs/draw/axes.py FOLDER", pictures={"axes.png": "axes.png"}),
     "shear": Part(
         "-m jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um "

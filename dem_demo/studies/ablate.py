@@ -36,7 +36,11 @@ INGREDIENTS: dict[str, dict[str, Any]] = {  # by name: the keys of a law without
     "elastic asperities": {"asperity": {"yield_interference": np.inf}},
     "b = 0": {"orientation": {"b": 0.0}},
     "c = 0": {"orientation": {"c": 0.0}},
-    "no large shear": {"mating_length": np.inf, "slope_wear": np.inf},
+    "no large shear": {
+        "mating_length": np.inf,
+        "slope_wear": np.inf,
+        "degradation_stress": np.inf,
+    },
     "one depth cell": {"resolution": {"depth": 1}},
 }
 

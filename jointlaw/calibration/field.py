@@ -12,7 +12,7 @@ from ..laws.joint_law import JointLaw
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..parameters.rock import ROCK
-from ..support.checks import more_than
+from ..support.checks import more_than, one_of
 
 ASSUMED = (
     "Assumed (not constrained by field values): contacts of asperities of 1 mm radius in rock of "
@@ -23,6 +23,9 @@ ASSUMED = (
     "strength above the basic friction is dilation, where Barton assumes half. The law holds near "
     "this normal stress; for other stresses fit a closure and a shear test (jointlaw fit)."
 )
+# JCS over degradation stress. The peak then follows Barton's from 0.5 to 10 MPa within 1.5 degrees
+# (JRC 10, JCS 100 MPa), without degradation by work
+_JCS_OVER_DEGRADATION_STRESS = 4.0
 _MAX_ITERATIONS = 30
 _SHEAR_PER_PEAK = 4.0  # shear displacement of a test over the peak displacement
 _MAX_ANGLE_ERROR = 0.1  # degrees, of the peak friction angle
@@ -40,6 +43,7 @@ def from_field(
     normal_stress: float,
     normal_stiffness: float,
     basic_friction: float = math.radians(30),
+    degradation: str = "work",
 ) -> JointLaw:
     """The law with Barton's peak friction angle and peak displacement at one normal stress.
 
@@ -54,6 +58,9 @@ def from_field(
     normal_stress: in Pa; the law is less accurate at other normal stresses (docs/field.md).
     normal_stiffness: tangent stiffness at this normal stress in Pa/m.
     basic_friction: friction angle of the flat rock surface in rad.
+    degradation: "work" for asperities that degrade over 1.25 mating lengths of shear at the peak
+        strength (`slope_wear`); "stress" for a `degradation_stress` of JCS/4 instead, by which the
+        peak falls with the normal stress also where no work is counted, as in strength reduction.
 
     Returns the law. Raises ValueError if no such law has these values.
 
@@ -72,6 +79,7 @@ def from_field(
     }
     for name, value in arguments.items():
         more_than(name, value, 0.0)
+    one_of("degradation", degradation, ("work", "stress"))
     basic_angle = math.degrees(basic_friction)
     roughness_angle = jrc * math.log10(jcs / normal_stress)
     max_roughness_angle = _MAX_FRICTION_ANGLE - basic_angle
@@ -85,6 +93,9 @@ def from_field(
     peak_angle = basic_angle + roughness_angle
     target_displacement = peak_displacement(jrc, length)
     law = _initial_law(basic_friction, roughness_angle, normal_stress, target_displacement)
+    if degradation == "stress":
+        stress = jcs / _JCS_OVER_DEGRADATION_STRESS
+        law = replace(law, slope_wear=math.inf, degradation_stress=stress)
     try:
         for _ in range(_MAX_ITERATIONS):  # each parameter is scaled by target over result
             result = shear_past_peak(law, normal_stress, target_displacement)

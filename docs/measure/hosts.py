@@ -132,15 +132,18 @@ RESTART_SCRIPT = (
 )
 
 YADE_COLUMNS = {
-    "loop": "law and geometry of YADE",
+    "step": "whole step",
+    "ratio": "step / Cundall-Strack",
     "adapter": "time that the adapter adds",
+    "access": "part of it to read and write YADE's objects",
     "law": "part of it in our law",
 }
 YADE_SCENE = """
 import json, sys, time
 sys.path.insert(0, ".")
 import numpy as np
-from yade_joint import Joints, LiveLaw, TableLaw
+from collections import deque
+from yade_joint import Joints, LiveLaw, TableLaw, iter_made_real
 contacts = {contacts}
 runs = {runs}
 OWN_LAWS = "cundall", "hertz"
@@ -169,34 +172,31 @@ def build(law):
                  InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [physics], [contact_law]),
                  NewtonIntegrator(damping=.2)]
     O.dt = 1e-8
-    O.timingEnabled = True
 
-def interaction_loop_time():
-    shortest = 1e9
-    for _ in range(runs):
-        O.engines[2].execTime = 0
-        O.step()
-        shortest = min(shortest, O.engines[2].execTime)
-    return shortest                               # ns per step
-
-def adapter_times(joints):
-    shortest_adapter = 1e9
-    shortest_law = 1e9
-    law_step = joints.law.step
-    seconds = [0.0]
-    def timed_step(*arguments):
-        start = time.perf_counter()
-        result = law_step(*arguments)
-        seconds[0] += time.perf_counter() - start
+def timed(function, add):
+    # the function, which adds its processor time (ns) by add(time)
+    def timed_function(*arguments):
+        start = time.thread_time()
+        result = function(*arguments)
+        add(1e9 * (time.thread_time() - start))
         return result
-    joints.law.step = timed_step
+    return timed_function
+
+def shortest_time(function, prepare=lambda: None):
+    shortest = []
+    call = timed(function, shortest.append)
     for _ in range(runs):
-        O.engines[3].execTime = 0
-        seconds[0] = 0.0
-        O.step()
-        shortest_adapter = min(shortest_adapter, O.engines[3].execTime)
-        shortest_law = min(shortest_law, seconds[0] * 1e9)
-    return shortest_adapter, shortest_law
+        prepare()
+        call()
+    return min(shortest)
+
+def access(joints, zeros):
+    # read interactions and bodies, and add forces, by the calls of the adapter
+    list(map(iter_made_real, joints.interactions))
+    O.interactions.countReal()
+    joints._read_bodies()
+    deque(map(O.forces.addF, joints.bodies, zeros), maxlen=0)
+    deque(map(O.forces.addT, joints.bodies, zeros), maxlen=0)
 
 results = {{}}
 for law in {kinds}:
@@ -210,12 +210,18 @@ for law in {kinds}:
     for _ in range(3):
         O.step()
     n = O.interactions.countReal()
-    if law in OWN_LAWS:
-        results[law] = dict(contacts=n, loop=interaction_loop_time() / n)
-    else:
-        adapter, inner = adapter_times(joints)
+    results[law] = dict(contacts=n, bodies=len(O.bodies), step=shortest_time(O.step) / n)
+    if law not in OWN_LAWS:
+        adapter = []
+        inner = []
+        joints.step = timed(joints.step, adapter.append)
+        joints.law.step = timed(joints.law.step, inner.append)
+        for _ in range(runs):
+            O.step()
         assert len(joints) == n and np.isfinite(joints.F).all() and joints.F[0].min() > 0
-        results[law] = dict(contacts=n, adapter=adapter / n, law=inner / n)
+        zeros = [[0.0] * 3] * len(joints.bodies)
+        alone = shortest_time(lambda: access(joints, zeros), prepare=O.step)
+        results[law].update(adapter=min(adapter) / n, law=min(inner) / n, access=alone / n)
 print("RESULT " + json.dumps(results), flush=True)
 """
 
@@ -423,11 +429,12 @@ def extrapolate_to_cluster(run):
     )
 
 
-def yade(contacts=20_000, runs=60, preset="jing-replica"):
+def yade(contacts=3000, runs=100, preset="jing-replica"):
     """Cost per contact and step in YADE: its own laws, a joint table, and the joint law itself.
 
-    One thread; shortest times of several runs. *law and geometry of YADE* is the time of its
-    InteractionLoop, *time that the adapter adds* is the time of the joint's adapter with torque.
+    Processor time of one thread; shortest times of several steps. *time that the adapter adds* is
+    the time of the joint's adapter with torque. Its part *to read and write YADE's objects* is the
+    time of the same reads and additions of forces alone, which no adapter in Python avoids.
     """
     law = jl.presets.load(preset)
     names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode"}
@@ -437,9 +444,14 @@ def yade(contacts=20_000, runs=60, preset="jing-replica"):
     times = yade_times(law, list(names), contacts, runs)
     rows = []
     for kind, name in names.items():
-        cells = [times[kind].get(column) for column in YADE_COLUMNS]
-        rows.append([name, *("" if ns is None else f"{ns:.0f}" for ns in cells)])
+        ratio = times[kind]["step"] / times["cundall"]["step"]
+        cells = times[kind] | {"ratio": ratio}
+        formats = {"ratio": ".1f"}
+        rows.append([name, *(format(cells[column], formats.get(column, ".0f")) if column in cells
+                             else "" for column in YADE_COLUMNS)])  # fmt: skip
     print_table(["", *YADE_COLUMNS.values()], rows)
+    first = times["cundall"]
+    print(f"{first['bodies']} spheres, {first['contacts']} contacts")
 
 
 def yade_times(law, kinds, contacts, runs):

@@ -40,6 +40,8 @@ SI units: m, Pa, N, s, kg.
 
 # ruff: noqa: B905 (older versions of Python lack strict=)
 
+from collections import deque
+from itertools import chain
 from operator import attrgetter
 
 import numpy as np
@@ -438,10 +440,9 @@ class Joints:
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
         turn = [np.bincount(c["b1"], t1, size) + np.bincount(c["b2"], t2, size)
                 for t1, t2 in zip(torque1, torque2)]  # fmt: skip
-        forces = O.forces
-        for k, f, t in zip(self.bodies, np.array(total).T.tolist(), np.array(turn).T.tolist()):
-            forces.addF(k, f)
-            forces.addT(k, t)
+        # deque: calls without the cost of a loop in Python
+        deque(map(O.forces.addF, self.bodies, zip(*(f.tolist() for f in total))), maxlen=0)
+        deque(map(O.forces.addT, self.bodies, zip(*(t.tolist() for t in turn))), maxlen=0)
 
     # ---------------------------------------------------------------- contacts
 
@@ -598,10 +599,9 @@ class Joints:
 
     def _read_bodies(self):
         """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
-        return (
-            columns([s.pos.__getinitargs__() for s in self.states], 3),
-            columns([s.ori.__getinitargs__() for s in self.states], 4),
-        )
+        positions = map(Vector3.__getinitargs__, map(attrgetter("pos"), self.states))
+        orientations = map(Quaternion.__getinitargs__, map(attrgetter("ori"), self.states))
+        return read_columns(positions, 3), read_columns(orientations, 4)
 
     # ------------------------------------------------------ checkpoints and output
 
@@ -682,6 +682,11 @@ def interaction_key(i):
 def columns(rows, size):
     """Array (size, n) from n rows."""
     return np.reshape(rows, (-1, size)).T.copy()
+
+
+def read_columns(rows, size):
+    """As `columns`, from an iterator over rows, without a list of them."""
+    return np.fromiter(chain.from_iterable(rows), float).reshape(-1, size).T.copy()
 
 
 def dot(a, b):

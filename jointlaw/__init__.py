@@ -13,6 +13,7 @@ from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .joints.pool import JointPool
 from .joints.state import JointState, NonFiniteError, load_state
+from .joints.time_step import stable_time_step
 from .kernels.element import Element, ElementResponse
 from .kernels.engine import Step
 from .kernels.reference import LawTables
@@ -85,6 +86,7 @@ __all__ = [
     "parameter",
     "presets",
     "secant",
+    "stable_time_step",
     "tabulate",
 ]
 

@@ -26,8 +26,9 @@ from ..kernels.engine import (
     engine,
     is_increasing,
 )
-from ..support.checks import Array, finite, integer, numbers
+from ..support.checks import Array, integer, numbers
 from .state import JointState, NonFiniteError
+from .time_step import single_mass_time_step
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
 Result = tuple[Array, Array | None]
@@ -226,14 +227,15 @@ class JointBatch:
 
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: in m2; numbers or (n,). Infinite where
         nothing touches. Joints that close or shear further become stiffer: compute it again, or
-        keep a margin. Rotation is not included, as in `JointLaw.critical_time_step`. Raises
+        keep a margin. Several joints on one body, bodies in series, and rotation need a smaller
+        step: `jl.stable_time_step(first, second, mass, area, joints.max_stiffness())`. Raises
         ValueError for other shapes or numbers <= 0.
         """
         for name, value in (("mass", mass), ("area", area)):
             shape = np.shape(value)
             if shape not in ((), (self._n,)):
                 raise ValueError(f"{name} has shape {shape}: give a number or ({self._n},)")
-        return stable_time_step(mass, area, self.max_stiffness())
+        return single_mass_time_step(mass, area, self.max_stiffness())
 
     @property
     def delta(self) -> Array:
@@ -394,16 +396,3 @@ def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
             f"d has shape {values.shape}; expected {shape}: {joints}{COMPONENTS[shape[-1]]}"
         )
     return values
-
-
-def stable_time_step(mass: ArrayLike, area: ArrayLike, stiffness: Array) -> Array:
-    """2 sqrt(m/(K area)) in s, infinite where the stiffness is zero.
-
-    mass: reduced mass in kg, > 0; area: in m2, > 0; stiffness: K in Pa/m.
-    """
-    m = finite("mass", mass, "kg")
-    a = finite("area", area, "m2")
-    if not ((m > 0).all() and (a > 0).all()):
-        raise ValueError(f"mass = {m} kg, area = {a} m2 are out of bounds: both must be > 0")
-    with np.errstate(divide="ignore"):
-        return 2 * np.sqrt(m / (stiffness * a))

@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike
 
 from ..discretisation.first_loading_response import find_closure
 from ..discretisation.tables import VERSION
-from ..joints.batch import JointBatch, stable_time_step
+from ..joints.batch import JointBatch
 from ..joints.joint import Joint
 from ..joints.preload import preload
+from ..joints.time_step import single_mass_time_step
 from ..kernels.admissible import require_admissible_states
 from ..kernels.engine import Step, engine
 from ..kernels.reference import LawTables
@@ -280,17 +281,18 @@ class Law:
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: of the joint in m2; closure: the largest
         closure of the run, in m, negative for unmated joints; shear: the largest shear displacement
         of the run, in m, in any direction; numbers or arrays of one shape. The result is
-        2 sqrt(m/(K area)), infinite where the stiffness is zero; a block code adds rotation. Shear
+        2 sqrt(m/(K area)), infinite where the stiffness is zero, without rotation. Shear
         compresses one side of the asperities: a step for closure alone is several times too long
         for a joint that was sheared far at constant closure. `JointBatch.critical_time_step` is the
-        same for joints in their present state.
+        same for joints in their present state. Several joints on one body, or bodies in series,
+        need a smaller step: `jl.stable_time_step`.
 
         A fraction of 0.95 is stable in lasting contact, and where friction dissipates energy in
         every impact. Impacts without dissipation need 0.2 or less, because they last only
         2/fraction steps (docs/limits.md). Raises ValueError as `max_stiffness`
         does.
         """
-        return stable_time_step(mass, area, self.max_stiffness(closure, shear))[()]
+        return single_mass_time_step(mass, area, self.max_stiffness(closure, shear))[()]
 
     @cached_property
     def max_effective_closure(self) -> float:

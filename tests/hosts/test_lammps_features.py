@@ -180,3 +180,90 @@ def test_changes_between_runs(plugin):
     counts = re.findall(r"jointlaw: (\d+) joints under load were deleted", text)
     assert sum(map(int, counts)) == after["c_joint[5]"][-1] > 0
     assert "is above the largest stable one" in text
+
+
+POURED = (
+    HEAD
+    + """boundary f f f
+processors 2 1 1
+neighbor 0.002 bin
+region box block -0.03 0.03 -0.03 0.03 0 0.3
+create_box 2 box
+plugin load ./jointlawplugin.so
+pair_style jointlaw opening 1e-3 damping 0.3
+pair_coeff * * rock.jlaw
+fix weight all gravity 9.81 vector 0 0 -1
+region source block -0.006 0.006 -0.006 0.006 0.05 0.24
+fix source all pour 6 2 4711 region source diam one 0.02 dens 2600 2600 vol 0.4 50 vel 0 0 0 0 -6
+fix floor all wall/reflect zlo 0.01
+fix sides all wall/reflect xlo -0.006 xhi 0.006 ylo -0.006 yhi 0.006
+fix motion all nve/sphere
+timestep 4e-6
+compute joint all pair jointlaw
+compute distances all pair/local dist
+compute nearest all reduce min c_distances inputs local
+thermo 100
+thermo_style custom step atoms c_joint[1] c_nearest
+{small}run 18000
+"""
+)
+SMALL = """create_atoms 1 single 0 0 0.295
+set type 1 diameter 0.002 density 2600
+group small type 1
+fix rest small setforce 0 0 0
+"""
+
+
+@pytest.mark.parametrize(("small", "processors"), [("", 1), (SMALL, 2)])
+def test_poured_spheres_have_contacts(plugin, small, processors):
+    """fix pour into an empty box, and into a box with smaller spheres: no sphere passes another."""
+    script = POURED.format(small=small).replace(
+        "processors 2 1 1\n" if processors == 1 else "\0", ""
+    )
+    text = run(plugin, script, processors)
+    table = thermo(text)[0]
+    assert float(re.search(r"master list distance cutoff = ([\d.]+)", text)[1]) == 0.023
+    assert table["Atoms"][-1] == 6 + bool(small)
+    assert table["c_joint[1]"].any()
+    # the spheres bounce: at 6 m/s a contact closes by a small part of the radius
+    assert table["c_nearest"].min() > 0.0195
+
+
+GROWING = (
+    HEAD
+    + """boundary f f f
+region box block -0.1 0.1 -0.1 0.1 -0.1 0.1
+create_box 1 box
+create_atoms 1 single -0.012 0 0
+create_atoms 1 single 0.012 0 0
+set type 1 diameter 0.02 density 2600
+plugin load ./jointlawplugin.so
+pair_style jointlaw opening 1e-3 {keyword}
+pair_coeff * * rock.jlaw
+neighbor 0.001 bin
+variable diameter equal 0.02+0.0041*step/100
+fix growth all adapt 1 atom diameter v_diameter
+fix hold all move linear 0 0 0
+timestep 1e-7
+compute force all reduce max fx
+compute joint all pair jointlaw
+thermo_style custom step c_force c_joint[1]
+thermo_modify format float %.17g
+run 100
+"""
+)
+
+
+@pytest.mark.parametrize("processors", [1, 2])
+def test_spheres_that_grow(plugin, processors):
+    """fix adapt: with `max_radius` they touch; without it the run stops with the remedy."""
+    script = GROWING.format(keyword="max_radius 0.01205")
+    table = thermo(run(plugin, script.replace("sphere\n", "sphere 1\n", 1), processors))[0]
+    radius = 0.5 * (0.02 + 0.0041 * np.array([0.99, 1.0]))
+    expected = [np.pi * r**2 * float(LAWS["rock"].normal_stress(2 * r - 0.024)) for r in radius]
+    assert expected[0] * (1 - 1e-9) < table["c_force"][-1] < expected[1] * (1 + 1e-9)
+    script = GROWING.format(keyword="")
+    text = run(plugin, script.replace("sphere\n", "sphere 1\n", 1), processors, code=1)
+    assert re.search(
+        r"has radius 0.01\d+ m at step 1, but .* give pair_style .* max_radius R", text
+    )

@@ -2,7 +2,7 @@
 //
 //     plugin load ./jointlawplugin.so
 //     pair_style jointlaw opening R [area A | area radius] [gap G] [damping Z]
-//                         [plane X Y Z [closure0 S]]
+//                         [max_radius R] [plane X Y Z [closure0 S]]
 //     pair_coeff I J granite.jlaw
 //
 // Each joint has an owner: of two spheres the one with the lower ID, of two bodies (plane) the point in
@@ -162,13 +162,13 @@ class PairJointlaw : public Pair {
 
   std::vector<Law> laws;
   std::vector<int> law_of;    // (ntypes + 1)^2
-  double opening, area, gap, damping, closure0;
+  double opening, area, gap, damping, closure0, max_radius;
   bool planar;
   Vector normal, in_plane2, in_plane3;
   std::string memory_id;
   FixJointlawMemory *joints_of = nullptr;
   int rows = 0, size = 0;    // doubles of the largest state, of a joint
-  std::vector<double> largest;
+  std::vector<double> largest;    // radius (m) of each type in this run, for which contacts are found
   std::vector<int> first, candidates;    // possible partners of each atom in the neighbour list
   std::vector<Opposite> opposites;
   std::vector<Step> steps;
@@ -228,6 +228,8 @@ class PairJointlaw : public Pair {
   void collect_outputs();
   std::array<double, 1 + OUTPUTS> joint_outputs(const double *, const jlaw_law *) const;
   uint64_t hash_laws() const;
+  void find_largest_radii();
+  void check_radius(int) const;
   void register_atoms();
 };
 
@@ -268,7 +270,7 @@ double PairJointlaw::number(int &at, int narg, char **arg, const char *keyword)
 void PairJointlaw::settings(int narg, char **arg)
 {
   opening = -1.0;
-  area = gap = damping = closure0 = 0.0;
+  area = gap = damping = closure0 = max_radius = 0.0;
   planar = false;
   bool has_closure0 = false, has_area = false;
   for (int at = 0; at < narg; at++) {
@@ -276,6 +278,7 @@ void PairJointlaw::settings(int narg, char **arg)
     if (keyword == "opening") opening = number(at, narg, arg, "opening");
     else if (keyword == "gap") gap = number(at, narg, arg, "gap");
     else if (keyword == "damping") damping = number(at, narg, arg, "damping");
+    else if (keyword == "max_radius") max_radius = number(at, narg, arg, "max_radius");
     else if (keyword == "closure0") {
       closure0 = number(at, narg, arg, "closure0");
       has_closure0 = true;
@@ -298,13 +301,14 @@ void PairJointlaw::settings(int narg, char **arg)
       planar = true;
     } else {
       error->all(FLERR, "pair_style jointlaw: unknown keyword {}; keywords are opening, area, "
-                 "gap, damping, plane, closure0", keyword);
+                 "gap, damping, max_radius, plane, closure0", keyword);
     }
   }
   if (!(opening >= 0.0))
     error->all(FLERR, "pair_style jointlaw: opening R is missing, R >= 0: opening (m) beyond "
                "which a joint is deleted");
   if (!(damping >= 0.0)) error->all(FLERR, "pair_style jointlaw: damping {} must be >= 0", damping);
+  if (!(max_radius >= 0.0)) error->all(FLERR, "pair_style jointlaw: max_radius {} must be >= 0 m", max_radius);
   if (planar && !has_area)
     error->all(FLERR, "pair_style jointlaw: plane needs area A, the area of joint (m2) per point");
   if (has_closure0 && !planar) error->all(FLERR, "pair_style jointlaw: closure0 requires plane X Y Z");
@@ -466,12 +470,37 @@ void PairJointlaw::init_style()
   has_local_output = !modify->get_compute_by_style("pair/local").empty();
   output_step = -1;
 
-  std::vector<double> mine(n + 1, 0.0);
+  find_largest_radii();
+  neighbor->add_request(this, NeighConst::REQ_FULL);
+}
+
+// Largest radius of each type in this run: of present atoms, of atoms that fix pour and fix deposit will
+// insert, and max_radius
+void PairJointlaw::find_largest_radii()
+{
+  const int n = atom->ntypes;
+  std::vector<double> mine(n + 1, max_radius);
   largest.assign(n + 1, 0.0);
   for (int i = 0; i < atom->nlocal; i++)
     mine[atom->type[i]] = std::max(mine[atom->type[i]], atom->radius[i]);
+  for (const char *style : {"^pour", "^deposit"})
+    for (const auto &fix : modify->get_fix_by_style(style))
+      for (int type = 1; type <= n; type++) {
+        int of_type = type;
+        if (const auto radius = static_cast<double *>(fix->extract("radius", of_type)))
+          mine[type] = std::max(mine[type], *radius);
+      }
   MPI_Allreduce(mine.data(), largest.data(), n + 1, MPI_DOUBLE, MPI_MAX, world);
-  neighbor->add_request(this, NeighConst::REQ_FULL);
+}
+
+// Stop before contacts of a sphere that has grown, or was inserted, would be missed
+void PairJointlaw::check_radius(int i) const
+{
+  const int type = atom->type[i];
+  if (atom->radius[i] <= largest[type] * (1.0 + 1e-12)) return;
+  error->one(FLERR, "pair_style jointlaw: atom {} of type {} has radius {} m at step {}, but the cutoff of "
+             "this run is for radii up to {} m; give pair_style jointlaw ... max_radius R with the "
+             "largest radius of the run", atom->tag[i], type, atom->radius[i], update->ntimestep, largest[type]);
 }
 
 double PairJointlaw::init_one(int i, int j)
@@ -539,6 +568,7 @@ void PairJointlaw::compute(int eflag, int vflag)
       for (int k = 0; k < next.n * size; k += 8) __builtin_prefetch(next.joint(0, 1) + k, 1);
     }
     const int i = list->ilist[ii], *partners = candidates.data() + first[ii];
+    check_radius(i);
     const int count = first[ii + 1] - first[ii];
     AtomJoints &own = joints_of->of[i];
     if (count == 0 && own.n == 0) continue;

@@ -87,7 +87,8 @@ class Blocks:
         self._space.step(BROAD_PHASE_STEP)
 
     def neighbour_pairs(self) -> np.ndarray:
-        """Pairs (p, 2) of blocks whose gap is less than the sum of their skins, sorted.
+        """Pairs (p, 2) of blocks, at least one of which moves, whose gap is less than the sum of
+        their skins; sorted.
 
         From the broad phase of pymunk at the present positions, which may add pairs with a slightly
         larger gap. Removed blocks have no pairs.

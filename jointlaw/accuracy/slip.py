@@ -79,10 +79,15 @@ def random_slip_tests(rng: np.random.Generator, count: int, dim: int) -> Array:
 
 
 def run_slip_tests(law: JointLaw, closure_range: float, stress: float, tests: Array) -> SlipResults:
-    """Shear new joints forwards and back at constant normal stress.
+    """Shear new joints forwards and back at constant normal stress, in steps of a geometric series.
 
     closure_range: of the standard paths, in m. stress: the normal stress S/2 in Pa.
-    tests: (n, 3) as in `standard_slip_tests`.
+
+    tests: (n, 3), one row for each test: its normal stress as a fraction of `stress`, the azimuth
+    of shear in degrees, and its slip as a fraction of `max_slip`.
+
+    Returns tractions, friction angles and dilation angles by step and test, and where friction is
+    mobilised.
     """
     stress_fraction, azimuth, length_fraction = tests.T
     dim = law.tables.dim

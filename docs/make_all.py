@@ -70,7 +70,7 @@ PARTS = {
     "extrapolation": Part("docs/measure/fits.py extrapolation", page="validation.md"),
     "intervals": Part("docs/measure/fits.py intervals", page="validation.md"),
     "coverage": Part("docs/measure/coverage.py", page="validation.md"),
-    "peak-residual": Part("docs/measure/fits.py peak-and-residual", page="validation.md"),
+    "sandstone": Part("docs/measure/fits.py sandstone", page="validation.md"),
     "extremes": Part("docs/measure/test_figures.py extremes", quoted_in="validation.md"),
     "exact-steps": Part("docs/measure/test_figures.py exact-steps", quoted_in="validation.md"),
     # limits.md, theory-incremental.md

@@ -18,7 +18,7 @@ import numpy as np
 import jointlaw as jl
 
 # %%
-# A sandstone joint (profile JA of `the validation <../validation.html#peak-and-residual>`_), whose
+# A sandstone joint (profile JA, `validation <../validation.html#held-out-shear-tests>`_), whose
 # dilation decays over a ``mating_length`` of 7.5 mm.
 
 mu = 0.747

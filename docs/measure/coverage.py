@@ -66,7 +66,7 @@ CASES = {
     "three points": Case(3),
     "white noise": Case(15),
     "autocorrelated": Case(30, autocorrelation=0.9),
-    "specimens": Case(14, (1e6, 2e6, 4e6), noise=0.01, spread=0.06, draws=100),
+    "specimens": Case(14, (1e6, 2e6, 4e6), noise=0.01, spread=0.06),
     "degradation": Case(15, noise=0.01, changes={"slope_wear": 4e3}, draws=20),
 }
 

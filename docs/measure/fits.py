@@ -4,7 +4,7 @@
     python docs/measure/fits.py extrapolation [--draws 20] [--prior full_contact_stress=2e7,2e10]
     python docs/measure/fits.py empirical-laws
     python docs/measure/fits.py closure-predictions
-    python docs/measure/fits.py peak-and-residual
+    python docs/measure/fits.py sandstone
 
 Empirical closure laws, of three parameters each, where u0 is the closure before the test began
 (hyperbola: Bandis, Lumsden & Barton 1983):
@@ -25,6 +25,13 @@ from scipy.optimize import least_squares
 
 import jointlaw as jl
 from jointlaw.calibration import datasets
+from jointlaw.calibration.envelopes import (
+    ENVELOPES,
+    envelope_strength,
+    normal_at_peak_and_last,
+    peak_and_last,
+)
+from jointlaw.calibration.meaning import respond, spacing
 from jointlaw.calibration.measured import first_loading
 from jointlaw.support.progress import track
 
@@ -52,19 +59,40 @@ GRIMSEL_CHOICES = [
     (top, alpha) for top in (3.2e6, 4.2e6, 5.3e6) for alpha in ((0, 20), (1, 10), (0, 100))
 ]
 
-# peak and residual: normal stress (MPa): peak (MPa), its displacement (mm), stress at 10 mm (MPa)
-MEASURED_SHEAR = {
-    1.0: (1.280, 1.937, 0.862),
-    2.0: (2.310, 2.365, 1.775),
-    3.0: (3.418, 1.994, 2.575),
-    4.0: (4.468, 2.422, 3.483),
-    5.0: (5.719, 2.650, 4.331),
+# sandstone: joints of profile JA, dry (0 days) and soaked (Mendeley Data, doi
+# 10.17632/g5pf6k9n2w, as parsed by ybfo/RockJointNet). Days in water: normal stress (MPa): peak
+# (MPa), its displacement (mm), last shear stress (MPa), its displacement (mm)
+SANDSTONE = {
+    0: {
+        1.0: (1.27995, 1.93732, 0.8615, 9.97151),
+        2.0: (2.3101, 2.36467, 1.77513, 10.0),
+        3.0: (3.41788, 1.9943, 2.57545, 10.0),
+        4.0: (4.46802, 2.42165, 3.48313, 10.02849),
+        5.0: (5.71879, 2.64957, 4.33097, 10.02849),
+    },
+    30: {
+        1.0: (1.34898, 1.80036, 1.10121, 10.02452),
+        2.0: (2.29358, 2.06711, 1.72, 10.02017),
+        3.0: (3.17967, 3.26464, 2.57746, 10.01513),
+        4.0: (4.01691, 2.35556, 3.24172, 9.95055),
+        5.0: (5.18605, 2.529, 4.23256, 10.00462),
+    },
+    180: {
+        1.0: (1.1597, 1.69231, 0.89354, 10.0),
+        2.0: (2.22738, 1.46154, 1.7, 10.02564),
+        3.0: (3.1749, 2.12821, 2.37643, 10.05128),
+        4.0: (3.74525, 1.84615, 3.1749, 8.82051),
+        5.0: (4.93916, 2.97436, 4.17771, 10.02564),
+    },
+    360: {
+        1.0: (1.21339, 1.1509, 0.8159, 10.02558),
+        2.0: (1.86982, 1.91816, 1.34762, 10.02558),
+        3.0: (2.82427, 2.30179, 2.38, 10.05115),
+        4.0: (3.68201, 2.37852, 3.16, 10.0),
+        5.0: (4.55658, 2.711, 3.54394, 10.02558),
+    },
 }
-FITTED_NORMAL_STRESSES = (1.0, 3.0, 5.0)  # MPa
-# K (Pa m^(-1/2)) includes the density: shear tests cannot separate the two
-START = {"K": 3e6, "a": 3.0, "mu": 0.5, "mating_length": 5e-3}
-# of peak, its displacement, residual: a peak is flat, and its displacement scatters most
-WEIGHTS = np.array([1.0, 0.25, 1.0])
+FITTED_STRESSES = (1.0, 3.0, 5.0)  # MPa
 
 
 def intervals(draws=40):
@@ -348,72 +376,68 @@ def fit_empirical_law(name, stress, closure):
     return lambda closure: stress[-1] * law(best, (closure - first_closure) / span)
 
 
-def peak_and_residual():
-    """Peak and residual shear stress of sandstone joints: a law fitted to three tests.
+def sandstone():
+    """Held-out peaks and last stresses of sandstone joints: the law and empirical envelopes.
 
-    Direct shear to 10 mm of profile JA, dry (Mendeley Data, doi 10.17632/g5pf6k9n2w, as parsed by
-    ybfo/RockJointNet). The tests at 1, 3 and 5 MPa are fitted, the tests at 2 and 4 MPa predicted:
-    peak, its displacement, and the stress at 10 mm, taken as residual. Prints the law, each figure
-    compared with the measured one, and the change when the step is halved.
+    Direct shear to 10 mm of joints of one profile, four sets of five tests, each with start, peak
+    and last stress; no closure test and no opening. In each set the tests at 1, 3 and 5 MPa are
+    fitted and the tests at 2 and 4 MPa predicted; then each test is predicted from the other four.
+    Prints the root mean square errors, and of each fit its law, normal stiffness at 1 MPa, spacing
+    of asperities, and errors.
     """
-    start = np.log(list(START.values()))
-    bounds = start - 3, start + 3
-    fit = least_squares(shear_misfit, start, bounds=bounds, diff_step=1e-3, xtol=1e-6)
-    parameters = zip(START, np.exp(fit.x), strict=True)
-    law = ", ".join(f"{name} = {value:.4g}" for name, value in parameters)
-    print(f"{law}; rms of the weighted misfit {np.sqrt(np.mean(fit.fun**2)):.4f}")
+    ways = {"2 and 4 MPa from 1, 3 and 5 MPa": [], "each test from the other four": []}
+    details = []
+    for days, tests in SANDSTONE.items():
+        curves = {stress: sandstone_test(days, stress, *test) for stress, test in tests.items()}
+        three = FITTED_STRESSES
+        folds = [(three, tuple(stress for stress in tests if stress not in three))]
+        folds += [
+            (tuple(other for other in tests if other != stress), (stress,)) for stress in tests
+        ]
+        for fold, (fitted, predicted) in enumerate(track(folds, f"{days} days", len(folds))):
+            errors, detail = predict_sandstone(
+                [curves[stress] for stress in fitted], [curves[stress] for stress in predicted]
+            )
+            ways[[*ways][min(fold, 1)]] += errors
+            details.append([f"{days}", ", ".join(f"{stress:g}" for stress in predicted), *detail])
     rows = []
-    for normal_stress, measured in MEASURED_SHEAR.items():
-        stress = sandstone_shear_stress(fit.x, normal_stress)
-        finer_stress = sandstone_shear_stress(fit.x, normal_stress, steps=240)[::2]
-        peak, displacement, residual = shear_figures(stress) / measured
-        change = np.max(np.abs(finer_stress - stress)) / stress.max()
-        note = "" if normal_stress in FITTED_NORMAL_STRESSES else ", predicted"
-        rows.append([f"{normal_stress:g}{note}", f"{100 * (peak - 1):+.1f} %",
-                     f"x {displacement:.2f}", f"{100 * (residual - 1):+.1f} %",
-                     f"{100 * change:.2f} %"])  # fmt: skip
-    print_table(["normal stress (MPa)", "error of the peak", "its displacement, law / measured",
-                 "error of the residual", "halved step"], rows)  # fmt: skip
+    for way, errors in ways.items():
+        rms = 100 * np.sqrt(np.mean(np.square(errors), axis=0))
+        rows.append([way, len(errors), *(f"{peak:.1f}, {last:.1f} %" for peak, last in rms)])
+    names = ["joint law", "without degradation", *ENVELOPES]
+    print_table(["predicted", "tests", *names], rows)
+    print()
+    print_table(["days in water", "predicted (MPa)", "degradation stress (MPa)",
+                 "normal stiffness at 1 MPa (GPa/m)", "spacing (mm)", "errors of the law (%)",
+                 "errors of Coulomb's line (%)"], details)  # fmt: skip
 
 
-def sandstone_law(x):
-    """The law of the logarithms (4,) of the parameters in START."""
-    values = dict(zip(START, np.exp(x).tolist(), strict=True))
-    return jl.JointLaw(
-        orientation=jl.Orientation(values["a"]),
-        asperity=jl.Asperity(values["K"], 1.17, 0.5, values["mu"]),
-        asperity_density=1e6,
-        closure_range=1e-3,
-        resolution=jl.Resolution(5, 3, 2),
-        plane=0.0,
-        mating_length=values["mating_length"],
-    )
+def sandstone_test(days, stress, peak, peak_displacement, last, last_displacement):
+    """A shear curve of start, peak and last stress."""
+    shear = 1e-3 * np.array([0.0, peak_displacement, last_displacement])
+    name = f"{days} days, {stress:g} MPa"
+    return jl.ShearCurve(shear, 1e6 * np.array([0.0, peak, last]), 1e6 * stress, name=name)
 
 
-def sandstone_shear_stress(x, normal_stress, steps=120):
-    """Shear stress (MPa) from 0 to 10 mm, (steps + 1,), at a normal stress (MPa)."""
-    record = jl.direct_shear(sandstone_law(x).joint(), 10e-3, normal_stress * 1e6, steps=steps)
-    return np.asarray(record.shear_stress) / 1e6
+def predict_sandstone(fitted, predicted):
+    """Errors of predicted peaks and last stresses, (methods, 2) of each test, and the fitted law.
 
-
-def shear_figures(stress):
-    """Peak (MPa), its displacement (mm) by a parabola about the peak, and the last stress (MPa)."""
-    top = int(np.clip(np.argmax(stress), 1, stress.size - 2))
-    before, peak, after = stress[top - 1 : top + 2]
-    shift = 0.5 * (before - after) / (before - 2 * peak + after)
-    return np.array([peak, 10 * (top + shift) / (stress.size - 1), stress[-1]])
-
-
-def shear_misfit(x):
-    """Weighted logarithms of model over measurement, for every figure of the fitted tests."""
-    ratios = [
-        np.log(shear_figures(sandstone_shear_stress(x, stress)) / MEASURED_SHEAR[stress])
-        for stress in FITTED_NORMAL_STRESSES
-    ]
-    return np.concatenate([WEIGHTS * ratio for ratio in ratios])
+    The methods are the law, the law without degradation, and the envelopes.
+    """
+    fits = [jl.fit_curves(fitted), jl.fit_curves(fitted, free=("mu", "a", "mating_length"))]
+    tests = [fit.predict_shear(*predicted) for fit in fits]
+    errors = []
+    for k, curve in enumerate(predicted):
+        normal = normal_at_peak_and_last(curve)
+        strengths = [peak_and_last(one[k].stress) for one in tests]
+        strengths += [envelope_strength(name, fitted, normal) for name in ENVELOPES]
+        errors.append(np.array(strengths) / peak_and_last(curve.shear_stress) - 1)
+    law = fits[0].law
+    stiffness = respond(law, 1e6).normal_stiffness
+    texts = [", ".join(f"{100 * x:+.1f}" for one in errors for x in one[row]) for row in (0, 2)]
+    figures = (law.degradation_stress / 1e6, stiffness / 1e9, 1e3 * spacing(law))
+    return errors, [*(f"{figure:.3g}" for figure in figures), *texts]
 
 
 if __name__ == "__main__":
-    run_command(
-        __doc__, intervals, extrapolation, empirical_laws, closure_predictions, peak_and_residual
-    )
+    run_command(__doc__, intervals, extrapolation, empirical_laws, closure_predictions, sandstone)

@@ -15,7 +15,7 @@ from ..support.progress import track
 from ..support.pyplot import escape_math, pyplot, style, written
 from .comparison import Comparison, compare, describe_quality
 from .estimates import CURVE_QUANTITIES, Estimates
-from .forward import log_stress
+from .forward import DEFAULT_STIFFNESS, DEFAULT_STIFFNESS_STRESS, log_stress
 from .meaning import describe
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
@@ -88,7 +88,14 @@ class Fit(Estimates):
             lines += ["", *self._correlation_table()]
         lines += ["", "## What this law means", ""]
         has_closure = self.problem.closure is not None
-        lines += describe(self.law, self._tested_stresses(), specimen_size, has_closure)
+        assumed = (DEFAULT_STIFFNESS, DEFAULT_STIFFNESS_STRESS)
+        lines += describe(
+            self.law,
+            self._tested_stresses(),
+            specimen_size,
+            has_closure,
+            assumed if self.problem.assumes_stiffness else None,
+        )
         lines += ["", "## Tests"]
         notes = [f"- {curve.name}: {note}" for curve in self.problem.curves for note in curve.notes]
         if notes:
@@ -329,12 +336,15 @@ def fit_curves(
         K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mating_length
         (m), slope_wear (J/m2), slope_residual; of a law with a bond cohesion (Pa), tension (Pa).
         Positive ones are fitted as logarithms. A closure curve that does not begin at zero stress
-        adds its closure at preload, preload_closure (m). None fits asperity_density; with a closure
-        curve alpha and beta, over cycles yield_interference too; with shear curves mu, a and
-        mating_length.
+        adds its closure at preload, preload_closure (m). None fits with a closure curve
+        asperity_density, alpha and beta, over cycles yield_interference too; with shear curves mu,
+        a and mating_length, with three normal stresses or more degradation_stress too.
     fixed: known values of other parameters, such as alpha from a scan, in SI units.
     law: values of all fixed parameters, `mating_length` among them; None takes rock
-        asperities, `forward.DEFAULT`, of "individual" formation. A law with a plane keeps it.
+        asperities, `forward.DEFAULT`, of "individual" formation, and without a closure curve
+        heights of `forward.DEFAULT_BETA` and the density with `forward.DEFAULT_STIFFNESS`.
+        Without degradation in the law, a free degradation_stress leaves the share
+        `forward.DEFAULT_SLOPE_RESIDUAL` of the slopes. A law with a plane keeps it.
         Heights of another kind than GammaHeights, or none, are kept. Its bond keeps stiffnesses
         and, where cohesion or tension change, the ratio of each given energy to the elastic energy
         at the peak.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import special
+from scipy import optimize, special
 
 from ..discretisation.facets import facets
 from ..discretisation.first_loading_curve import exact_force
@@ -32,6 +32,16 @@ DEFAULT = JointLaw(
     heights=GammaHeights(alpha=3.7, beta=1e-5, formation="individual"),
     asperity_density=1e6,
 )
+# Of shear tests without a closure test: heights of 0.2 mm (standard deviation), and the normal
+# stiffness in first loading of joints in laboratories, 15 to 200 GPa/m (Bandis, Lumsden & Barton
+# 1983), from which the density of the asperities follows: one per 1.1 mm x 1.1 mm
+DEFAULT_BETA = 1e-4  # m
+DEFAULT_STIFFNESS = 5e10  # Pa/m
+DEFAULT_STIFFNESS_STRESS = 1e6  # Pa
+STIFFNESS_STEP = 1e-4  # of the closure, of the slope of the first-loading curve
+# Share of the slopes that no stress degrades: the waviness of a joint stays where its unevenness is
+# sheared off. With none the strength envelope bends too evenly (docs/measure/fits.py sandstone)
+DEFAULT_SLOPE_RESIDUAL = 0.3
 INITIAL_STEPS = 30  # of a shear test; a fit doubles them while the results depend on them
 
 
@@ -107,6 +117,36 @@ def build_law(values: Values, settings: Settings, plane: float | None = None) ->
         degradation_stress=values["degradation_stress"],
         mating_length=max(values["mating_length"], min_mating_length),
     )
+
+
+def density_for_stiffness(law: JointLaw, stiffness: float, normal_stress: float) -> float:
+    """Density (1/m2) of asperities with which a law has a normal stiffness in first loading.
+
+    The stress is proportional to the density, so the density follows from the closure at which
+    d ln(stress)/d closure is the stiffness over the stress.
+
+    Parameters
+    ----------
+    law: the law, whose density is replaced.
+    stiffness: in Pa/m, > 0. normal_stress: in Pa, > 0, at which the law is to have it.
+
+    Raises ValueError if no density has this stiffness.
+    """
+    target = math.log(stiffness / normal_stress)
+
+    def excess(log_closure: float) -> float:
+        closures = math.exp(log_closure) * np.array([1 - STIFFNESS_STEP, 1 + STIFFNESS_STEP])
+        low, high = np.log(law.normal_stress(closures))
+        return math.log((high - low) / (2 * STIFFNESS_STEP)) - log_closure - target
+
+    shortest, longest = np.log([1e-9, 1e-2])
+    if excess(shortest) * excess(longest) > 0:
+        raise ValueError(
+            f"no asperity_density has a normal stiffness of {stiffness:g} Pa/m at "
+            f"{normal_stress:g} Pa with the heights of this law: give asperity_density"
+        )
+    closure = math.exp(optimize.brentq(excess, shortest, longest, xtol=1e-9))
+    return float(law.asperity_density * normal_stress / law.normal_stress(closure))
 
 
 def _with_values(part: Any, values: Values) -> Any:

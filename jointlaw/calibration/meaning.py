@@ -21,6 +21,11 @@ NO_CLOSURE = (
     "No closure was measured: do not use the closure and the stiffness of this law. Give a closure "
     "test, or fix asperity_density."
 )
+ASSUMED = (
+    "No closure was measured: density of asperities, closure and stiffness follow from an assumed "
+    "normal stiffness of {:.3g} GPa/m at {:.3g} MPa. Joints in laboratories have 15 to 200 GPa/m; "
+    "give a closure test, or --set asperity_density."
+)
 DIFFERENCE_STEP = 1e-4  # of the closure, of the slope of the first-loading curve
 _COLUMNS = (
     "normal stress (MPa) | closure (mm) | normal stiffness (GPa/m) | elastic shear stiffness "
@@ -72,6 +77,7 @@ def describe(
     stresses: Sequence[float],
     specimen_size: float | None = None,
     has_closure: bool = False,
+    assumed_stiffness: tuple[float, float] | None = None,
 ) -> list[str]:
     """The meaning of a law in sentences and a table (Markdown lines).
 
@@ -81,6 +87,7 @@ def describe(
     stresses: normal stresses in Pa, > 0.
     specimen_size: edge of the specimen in m; None takes 100 mm for the warning.
     has_closure: whether the closure was measured.
+    assumed_stiffness: normal stiffness (Pa/m) at a normal stress (Pa) that was assumed instead.
     """
     rows = []
     for stress in stresses:
@@ -104,6 +111,9 @@ def describe(
         "",
         *table(_COLUMNS, rows),
     ]
+    if assumed_stiffness is not None:
+        stiffness, stress = assumed_stiffness
+        lines += ["", ASSUMED.format(stiffness / 1e9, stress / 1e6)]
     remedy = ONLY_PRODUCT if has_closure else NO_CLOSURE
     size = SPECIMEN_SIZE if specimen_size is None else specimen_size
     if distance > MAX_SPACING * size:

@@ -54,7 +54,14 @@ LEVEL_FACTOR = 4.0  # the 95 % range of a level is from 1/4 to 4 times the expec
 LEVEL_FACTORS = {"load cell": 30.0}
 AUTOCORRELATIONS = np.array([0.0, 0.3, 0.6, 0.8, 0.9, 0.96])  # grid of rho
 INDEPENDENCE = 0.4  # prior probability of rho = 0; all others are equally probable
-SPREADS = np.array([0.0, 0.02, 0.04, 0.08, 0.16])  # grid of the spread, equally probable
+SPREADS = np.array([0.0, 0.02, 0.04, 0.08, 0.16])  # grid of the spread
+SPREAD_SCALE = 0.15  # of the half-normal density of the spread
+# Probability of each spread, from the density and the width of its cell, to 0.24. A density of the
+# standard deviation itself, nearly constant in the range of rock, instead of its logarithm: few
+# specimens cannot exclude a large spread, and the intervals must say so (Gelman 2006)
+SPREAD_WEIGHTS = np.diff([0.0, 0.01, 0.03, 0.06, 0.12, 0.24]) * np.exp(
+    -0.5 * (SPREADS / SPREAD_SCALE) ** 2
+)
 # Standard deviations of the logarithm of a level. A normal density on the first has its standard
 # deviation within 1 %, on the second, for more than `MAX_FINE_LEVELS`, within 5 %
 _LEVEL_GRID = np.linspace(-2.6, 2.6, 5)
@@ -438,6 +445,9 @@ class _Grid:
             dependent = (1 - INDEPENDENCE) / (AUTOCORRELATIONS.size - 1)
             probability = np.where(rho == 0.0, INDEPENDENCE, dependent)
             log_prior = log_prior + self.place((len(log_levels) + k,), np.log(probability))
+        if previous.has_specimens:
+            probability = np.interp(previous.spreads, SPREADS, SPREAD_WEIGHTS)
+            log_prior = log_prior + self.place((len(self.values) - 1,), np.log(probability))
         self._log_prior = log_prior
 
     def axes_of(self, series: Series) -> tuple[int, ...]:

@@ -38,7 +38,17 @@ from ..parameters.bond import Bond
 from ..parameters.declared import parameters_of
 from ..parameters.orientation import largest_c
 from ..support.checks import Array, number, one_of
-from .forward import Settings, build_law, log_stress, parameters_of_law
+from .forward import (
+    DEFAULT_BETA,
+    DEFAULT_SLOPE_RESIDUAL,
+    DEFAULT_STIFFNESS,
+    DEFAULT_STIFFNESS_STRESS,
+    Settings,
+    build_law,
+    density_for_stiffness,
+    log_stress,
+    parameters_of_law,
+)
 from .measured import ClosureCurve, ShearCurve, simulate_curves
 from .noise import (
     LinearTest,
@@ -73,6 +83,7 @@ CLOSURE_PARAMETERS = (
 )
 # initial mating lengths over the largest shear displacement
 INITIAL_MATING_LENGTHS = (0.5, 0.15, 0.05, 0.015)
+MIN_STRESS_DIFFERENCE = 0.05  # of normal stresses of tests that are different
 START_TOLERANCE = 1e-5  # relative change of parameters and misfit, with the expected noise
 COARSE_TOLERANCE = 1e-3  # likewise, for initial values
 REJECTED_RESIDUAL = 1e6  # of a law that cannot follow a test
@@ -93,6 +104,8 @@ class Problem:
     settings: fixed properties of the law.
     one_specimen: whether all tests are on one specimen.
     progress: a progress bar that advances with each law tried, or None.
+    assumes_stiffness: whether the density of asperities follows from the default stiffness, because
+        no closure was measured.
 
     A vector x (p,) has the free parameters after their transforms, mostly logarithms.
     """
@@ -105,6 +118,7 @@ class Problem:
     settings: Settings
     one_specimen: bool = False
     progress: Iterator[object] | None = None
+    assumes_stiffness: bool = False
 
     @property
     def curves(self) -> Curves:
@@ -240,6 +254,13 @@ def build_problem(
     values, settings = parameters_of_law(law)
     fixed = fixed or {}
     free = _default_free(closures, shears) if free is None else free
+    given = {*fixed, *free}
+    takes_default_heights = law is None and not closures and "beta" not in given
+    if takes_default_heights:
+        values["beta"] = DEFAULT_BETA
+    degrades = np.isfinite([values["slope_wear"], values["degradation_stress"]]).any()
+    if "degradation_stress" in free and not degrades and "slope_residual" not in given:
+        values["slope_residual"] = DEFAULT_SLOPE_RESIDUAL
     free_names = [name for name in free if name not in fixed]
     for name in (*fixed, *free_names):
         if name in parameters_of(Bond) and settings.law.bond is None:
@@ -249,7 +270,12 @@ def build_problem(
             )
         one_of("free or fixed", name, tuple(values))
     values |= {name: number(f"fixed[{name!r}]", value) for name, value in fixed.items()}
-    build_law(values, settings)  # raises ValueError for values that no law has
+    initial_law = build_law(values, settings)  # raises ValueError for values that no law has
+    assumes_stiffness = law is None and not closures and not given & {"asperity_density", "K"}
+    if assumes_stiffness:
+        values["asperity_density"] = density_for_stiffness(
+            initial_law, DEFAULT_STIFFNESS, DEFAULT_STIFFNESS_STRESS
+        )
     values |= {
         name: _finite_initial_value(name, closures, shears, build_law(values, settings))
         for name in free_names
@@ -267,15 +293,31 @@ def build_problem(
     dropped = {} if "alpha" in values else {"full_contact_stress": None}
     chosen = normal_priors(tuple(free_names), {**dropped, **(priors or {})})
     closure = next(iter(closures), None)
-    return Problem(closure, shears, tuple(free_names), values, chosen, settings, one_specimen)
+    return Problem(
+        closure,
+        shears,
+        tuple(free_names),
+        values,
+        chosen,
+        settings,
+        one_specimen,
+        assumes_stiffness=assumes_stiffness,
+    )
 
 
 def _default_free(closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]) -> list[str]:
-    """The free parameters of a fit to these tests if none are named."""
-    names = ["asperity_density"]
-    names += ["alpha", "beta"] if closures else []
+    """The free parameters of a fit to these tests if none are named.
+
+    Shear tests alone do not determine the density of asperities: it would bend the strength
+    envelope by joints that are much too soft. The degradation stress bends it, where tests at three
+    normal stresses or more show how.
+    """
+    names = ["asperity_density", "alpha", "beta"] if closures else []
     names += ["yield_interference"] if any(curve.cycle for curve in closures) else []
-    return names + (["mu", "a", "mating_length"] if shears else [])
+    names += ["mu", "a", "mating_length"] if shears else []
+    stresses = sorted(float(np.mean(curve.normal)) for curve in shears)
+    steps = np.diff(stresses) > MIN_STRESS_DIFFERENCE * np.array(stresses[1:])
+    return names + ["degradation_stress"] * bool(np.sum(steps) >= 2)
 
 
 # -------------------------------------------------------------------------- initial values

@@ -591,9 +591,9 @@ _PARAMETERS = Group(
         option(
             "--free",
             metavar="NAMES",
-            help="parameters to fit, separated by commas (default: asperity_density; for closure "
-            "tests alpha and beta, with --cycle yield_interference; for shear tests mu, a and "
-            "mating_length)",
+            help="parameters to fit, separated by commas (default: for closure tests "
+            "asperity_density, alpha and beta, with --cycle yield_interference; for shear tests "
+            "mu, a and mating_length, at three normal stresses or more degradation_stress)",
         ),
         option(
             "--one-specimen",

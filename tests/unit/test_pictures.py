@@ -148,7 +148,18 @@ def test_picture_of_a_fit(fit):
     result, stress, closure, (fitted, predicted) = fit
     held_out = np.array([6e6]), np.array([50e-6])
     figure = result.plot(held_out=held_out, predicted=[predicted])
-    closing, shearing, opening = figure.axes[:3]
+    closing, shearing, opening, *residuals = figure.axes
+    for axis, lower in zip(figure.axes, residuals, strict=False):
+        assert not axis.get_xlabel()  # the displacements are below the residuals
+        axis.set_xlabel(lower.get_xlabel())
+    (own, others) = (line for line in residuals[1].lines if line.get_marker() == "o")
+    for drawn, test in zip((own, others), (fitted, predicted), strict=True):
+        law_stress = result.predict_shear(test)[0]
+        difference = law_stress.stress[law_stress.points] - test.shear_stress
+        percent = 100 * difference / test.shear_stress.max()
+        is_compared = np.array([False, True, True, False, True])  # the peak at any displacement
+        np.testing.assert_allclose(drawn.get_xdata(), 1e3 * test.shear)
+        np.testing.assert_allclose(drawn.get_ydata()[is_compared], percent[is_compared])
     assert_line(closing, "measured", closure[1:], stress[1:])  # zero stress is not fitted
     assert_line(closing, "measured, not fitted", held_out[1], held_out[0])
     law = line_of(closing, "law")

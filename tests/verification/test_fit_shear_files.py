@@ -16,7 +16,13 @@ import pytest
 
 import jointlaw as jl
 from jointlaw import ClosureCurve, ShearCurve
+from jointlaw.calibration.forward import (
+    DEFAULT_SLOPE_RESIDUAL,
+    build_law,
+    density_for_stiffness,
+)
 from jointlaw.calibration.meaning import describe, respond
+from jointlaw.calibration.problem import build_problem
 from jointlaw.calibration.shearing import simulate_shear
 from jointlaw.cli.main import main
 
@@ -408,8 +414,8 @@ MEASURED = {
 @pytest.mark.usefixtures("in_an_empty_folder")
 def test_saved_law_has_the_fitted_peaks(tmp_path, capsys):
     """In steps of 10 um. The saved law has fewer nodes than the law of the fit: an error of 3 %.
-    The measured peaks are within 6 %, including the tests at 2 and 4 MPa, which were not fitted;
-    the residual stresses at 10 mm are within 4 %, the displacements of the flat peaks within a
+    The measured peaks are within 6 %, of the predicted tests at 2 and 4 MPa within 8 %;
+    the residual stresses at 10 mm are within 5 %, the displacements of the flat peaks within a
     factor of 2.
     """
     for normal, (peak, peak_shear, residual) in MEASURED.items():
@@ -418,8 +424,9 @@ def test_saved_law_has_the_fitted_peaks(tmp_path, capsys):
         (tmp_path / f"{normal}.csv").write_text("\n".join(["us [mm],tau [MPa],sn [MPa]", *rows]))
     files = [f"{normal}.csv" for normal in MEASURED]
     assert main(["fit", "--shear", *files, "--fit", "1MPa,3MPa,5MPa", "--out", "o"]) == 0
-    printed = capsys.readouterr().out
-    assert "Fix mu, asperity_density: give known values" in printed
+    printed, _, _ = capsys.readouterr().out.partition("## Provenance")
+    assert "Fix mu, degradation_stress: give known values" in printed
+    assert "follow from an assumed normal stiffness of 50 GPa/m at 1 MPa" in printed
     assert float(printed.partition("changes these figures by ")[2].split()[0]) < 0.5
     cells = [line.split("|")[1:] for line in printed.splitlines() if line.startswith("| ")]
     table = {name.strip(): [cell.split(",") for cell in more] for name, *more in cells}
@@ -431,16 +438,61 @@ def test_saved_law_has_the_fitted_peaks(tmp_path, capsys):
         top = int(np.argmax(record.shear_stress))
         stress = 1e-6 * record.shear_stress
         reported = table[f"{normal}.csv, {normal:g} MPa"]
-        if normal in (2.0, 4.0):
+        is_predicted = normal in (2.0, 4.0)
+        if is_predicted:
             coulomb_error = 100 * (np.polyval(line, normal) / peak - 1)
             assert float(reported[2][0]) == pytest.approx(coulomb_error, abs=0.06)
             predicted = peak * (1 + float(reported[1][0]) / 100)
             assert stress[top] == pytest.approx(predicted, rel=0.03)
         else:
             assert stress[top] == pytest.approx(float(reported[1][0]), rel=0.03)
-        assert stress[top] == pytest.approx(peak, rel=0.06)
-        assert stress[-1] == pytest.approx(residual, rel=0.04)
+        assert stress[top] == pytest.approx(peak, rel=0.08 if is_predicted else 0.06)
+        assert stress[-1] == pytest.approx(residual, rel=0.05)
         assert 0.5 < record.shear[top] / (1e-3 * peak_shear) < 2
+
+
+def default_problem(curves, law=None, free=None, fixed=None):
+    return build_problem(curves, free, fixed, law, None)
+
+
+def test_default_parameters_of_shear_tests(law):
+    """The envelope is bent by degradation where three stresses show it, not by soft joints."""
+    curves = [
+        ShearCurve([0.0, 2e-3, 1e-2], [0.0, 1.2 * normal, 0.9 * normal], normal)
+        for normal in (1e6, 3e6, 3.1e6, 5e6)
+    ]
+    problem = default_problem(curves)
+    assert problem.free == ("mu", "a", "mating_length", "degradation_stress")
+    assert problem.values["slope_residual"] == DEFAULT_SLOPE_RESIDUAL
+    assert problem.assumes_stiffness
+    density = problem.values["asperity_density"]
+    undegraded = problem.values | {"degradation_stress": np.inf}
+    response = respond(build_law(undegraded, problem.settings), 1e6)
+    assert response.normal_stiffness == pytest.approx(50e9, rel=1e-3)
+    # other heights need another density for this stiffness
+    other = default_problem(curves, fixed={"alpha": 1.0}).values
+    assert other["asperity_density"] != pytest.approx(density, rel=0.1)
+    stiffness = respond(build_law(other | {"degradation_stress": np.inf}, problem.settings), 1e6)
+    assert stiffness.normal_stiffness == pytest.approx(50e9, rel=1e-3)
+    # two stresses, of which one was tested twice, do not show how the envelope bends
+    two = default_problem(curves[:3])
+    assert two.free == ("mu", "a", "mating_length")
+    assert np.isinf(two.values["degradation_stress"])
+    given = default_problem(curves, fixed={"asperity_density": 2e6})
+    assert given.values["asperity_density"] == 2e6
+    assert not given.assumes_stiffness
+    from_law = default_problem(curves, law)
+    assert from_law.values["asperity_density"] == law.asperity_density
+    assert not from_law.assumes_stiffness
+    with_closure = default_problem(
+        [ClosureCurve([1e6, 2e6, 4e6, 8e6], 1e-5 * np.arange(4)), *curves]
+    )
+    assert {"asperity_density", "alpha", "beta", "degradation_stress"} <= set(with_closure.free)
+
+
+def test_no_density_has_a_stiffness_beyond_the_first_loading_curve(law):
+    with pytest.raises(ValueError, match="no asperity_density has a normal stiffness of 1e"):
+        density_for_stiffness(law, 1e20, 1e6)
 
 
 @pytest.mark.slow
@@ -450,7 +502,7 @@ def test_more_parameters_than_data_are_over_parameterised(tmp_path, capsys):
     (tmp_path / "s.csv").write_text("us [mm],tau [MPa],sn [MPa]\n0,0,3\n2,3.4,3\n10,2.6,3\n")
     free = "asperity_density,K,lam,mu,a,b,c,mating_length,yield_interference"
     assert main(f"fit --shear s.csv --free {free} --out o".split()) == 0
-    printed = capsys.readouterr().out
+    printed, _, _ = capsys.readouterr().out.partition("## Provenance")
     assert "The fit is over-parameterised. Fix " in printed
     assert "nan" not in printed
     assert not re.search(r"\d[eE][+-]?\d\d\d", printed)

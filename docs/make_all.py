@@ -77,6 +77,7 @@ PARTS = {
     "forgetting": Part("docs/measure/test_figures.py forgetting", quoted_in="limits.md"),
     "impacts": Part("docs/measure/test_figures.py impacts", quoted_in="limits.md"),
     "angle-sum": Part("docs/measure/random_laws.py angle-sum", quoted_in="limits.md"),
+    "step-sizes": Part("docs/measure/dissipation.py", quoted_in="theory-incremental.md"),
     "energy-gain": Part("docs/measure/energy_gain.py", quoted_in="limits.md theory-incremental.md"),
     # blocks.md
     "shaken-slab": Part("docs/measure/blocks.py shaken-slab", quoted_in="blocks.md"),

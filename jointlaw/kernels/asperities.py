@@ -384,8 +384,14 @@ class AsperityElement(Element):
 
 
 def shear_work(F0: Array, F: Array, d: Array) -> Array:
-    """Size (B,) in J/m2 of the work of the shear stress, from F0 to F, in the increment d."""
-    return np.abs(0.5 * np.sum((F0[1:] + F[1:]) * d[1:], axis=0))
+    """Size (B,) in J/m2 of the work of the shear stress, F0 before and F after the increment d.
+
+    The mean of the sizes at both: where the shear stress reverses in the step, its own mean would
+    vanish.
+    """
+    before, after = (np.abs(np.sum(stress[1:] * d[1:], axis=0)) for stress in (F0, F))
+    mean: Array = 0.5 * (before + after)
+    return mean
 
 
 def degrade(

@@ -1036,10 +1036,15 @@ JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3
   jl_joint_real dissipated = jl_total(sum, loss);
   if (k.degrades) {
     jl_joint_real normal = jl_total(sum, degradation_normal), work = jl_broadcast_joint(0.0);
-    for (int i = 1; i < dim; i++) work += 0.5 * (jl_total(sum, shear0[i - 1]) + F[i]) * m.p[i];
+    jl_joint_real work0 = work, work1 = work; /* of the shear stress before and after the step */
+    for (int i = 1; i < dim; i++) {
+      work0 += jl_total(sum, shear0[i - 1]) * m.p[i];
+      work1 += F[i] * m.p[i];
+    }
     for (int l = 0; l < JL_JOINTS_PER_PASS;
          l++) { /* only work of the joint's own shear degrades asperities */
-      const double shear = fabs(JL_JOINT(work, l)), friction = JL_JOINT(dissipated, l);
+      const double shear = 0.5 * (fabs(JL_JOINT(work0, l)) + fabs(JL_JOINT(work1, l))),
+                   friction = JL_JOINT(dissipated, l);
       JL_JOINT(work, l) = shear < friction ? shear : friction;
       /* >= 0 in the sum over opposite facets, but for rounding */
       JL_JOINT(normal, l) = JL_JOINT(normal, l) > 0.0 ? JL_JOINT(normal, l) : 0.0;

@@ -131,6 +131,19 @@ def test_shear_without_friction_and_closing_do_not_degrade_asperities(mu, path):
     assert joint.slope_retention == 1.0
 
 
+def test_a_step_that_reverses_the_shear_stress_degrades_asperities():
+    """From side to side in one step or in many: the mean of the stresses at both ends vanishes."""
+    lost = []
+    for count in (1, 4, 64):
+        joint = law(mu=0.4, mating_length=3.0, slope_wear=1.0, plane=0.0).joint()
+        for d in ([0.6, 0.0], [0.0, 0.25], *(5 * (count * [[0.0, -0.5]] + count * [[0.0, 0.5]]))):
+            joint.update([d[0], d[1] / (count if abs(d[1]) == 0.5 else 1)])
+        lost.append(1 - joint.slope_retention)
+    assert lost[2] > 0.1
+    assert lost[0] == pytest.approx(lost[2], rel=0.4)
+    assert lost[1] == pytest.approx(lost[2], rel=0.1)
+
+
 def test_asperities_degrade_by_the_work_of_shear():
     """slopes = s + (1 - s) exp(-work/slope_wear), of the step before; the dilation decreases with
     them."""

@@ -23,12 +23,20 @@ from jointlaw.support.files import SUMMARY, write_json
 from jointlaw.support.pyplot import FORMATS
 from jointlaw.support.version import __version__
 
+from .dynamics.blocks import drawn_overlaps, floating_blocks
 from .dynamics.relaxation import MAX_ITERATIONS, Verdict
 from .dynamics.simulation import Simulation
 from .output.folder import ABLATION, STRENGTH, TRIALS, require_free
 from .output.monitors import friction_angle
 from .output.pictures import Pictures
-from .output.record import RunRecord, format_blocks, format_outcome, list_blocks, report_lines
+from .output.record import (
+    MAX_LISTED_BLOCKS,
+    RunRecord,
+    format_blocks,
+    format_outcome,
+    list_blocks,
+    report_lines,
+)
 from .output.run import run, steps_to
 from .scene import TEMPLATE, Scene, SceneError, shipped
 from .scene.laws import law_warnings
@@ -363,6 +371,8 @@ def _check(options: argparse.Namespace) -> None:
         return
     sim = Simulation(scene)
     _describe(sim)
+    _warn_of_drawn_overlaps(sim.scene)
+    _warn_of_floating_blocks(sim)
     if sim.verdict:
         _print_limit_analysis(sim.scene)
         _check_stages(sim.scene)
@@ -396,6 +406,28 @@ def _check_stages(scene: Scene) -> None:
             continue
         _print_verdict(sim)
         _print_limit_analysis(excavated)
+
+
+def _warn_of_drawn_overlaps(scene: Scene) -> None:
+    """Name blocks that are drawn in each other, a fault of the drawing that closes their joints."""
+    found = drawn_overlaps(scene)
+    for first, second, depth in found[:MAX_LISTED_BLOCKS]:
+        print(
+            f"drawing fault: blocks {first!r} and {second!r} overlap by {depth:.2g} m as drawn, "
+            "which closes their joint by as much; draw them apart"
+        )
+    if len(found) > MAX_LISTED_BLOCKS:
+        print(f"drawing fault: {len(found) - MAX_LISTED_BLOCKS} more pairs of blocks overlap")
+
+
+def _warn_of_floating_blocks(sim: Simulation) -> None:
+    """Name the blocks that the water lifts with more than their weight."""
+    floats = floating_blocks(sim.scene, sim.blocks, sim.manager)
+    if floats.any():
+        blocks = format_blocks(list_blocks(sim.scene, floats))
+        count = int(floats.sum())
+        verb = "block floats" if count == 1 else "blocks float"
+        print(f"{count} {verb}: the water lifts more than the weight; check density: {blocks}")
 
 
 def _check_water_tables(scene: Scene) -> None:

@@ -14,6 +14,8 @@ from ..scene import Drives, FacePressure, Scene, SceneError, Stress
 from .bolts import Bolts
 
 MAX_SKIN_PER_STEP = 0.25  # fraction of its skin that a block may move in a step: no contact missed
+MAX_DRAWN_OVERLAP = 1e-3  # of the width of the smaller block: a larger overlap is a drawing fault
+FLOATING_SHARE = 1e-6  # of the weight: a smaller rest of buoyancy is rounding
 BROAD_PHASE_STEP = 1e-9  # s: pymunk detects pairs in a step; with no velocity nothing moves
 
 
@@ -162,6 +164,39 @@ def apply_loads(
     loads += contacts.assemble_forces(len(loads), np.stack([push, 0.0 * push], axis=1))
     blocks.loads[:] = loads * blocks.is_mobile
     return blocks.loads - old_loads
+
+
+def drawn_overlaps(scene: Scene) -> list[tuple[str, str, float]]:
+    """Pairs of blocks that are drawn in each other: two names and the depth (m), deepest first.
+
+    Smaller depths than a share of the block's width count as rounding, or as the closure of a joint
+    that is drawn closed.
+    """
+    blocks = Blocks(scene)
+    manager = ContactManager(scene, blocks.motion)
+    manager.rebuild(blocks.motion, blocks.neighbour_pairs())
+    contacts = manager.contacts
+    width = np.array([block.width for block in scene.blocks])
+    smaller = np.minimum(width[contacts.block_a], width[contacts.block_b])
+    is_fault = (contacts.closure > MAX_DRAWN_OVERLAP * smaller) & (contacts.length > 0)
+    depths: dict[tuple[int, int], float] = {}
+    for row in np.flatnonzero(is_fault).tolist():
+        pair = int(contacts.block_a[row]), int(contacts.block_b[row])
+        depths[pair] = max(depths.get(pair, 0.0), float(contacts.closure[row]))
+    return [
+        (blocks.names[a], blocks.names[b], depth)
+        for (a, b), depth in sorted(depths.items(), key=lambda item: -item[1])
+    ]
+
+
+def floating_blocks(scene: Scene, blocks: Blocks, manager: ContactManager) -> np.ndarray:
+    """Mask (n,) of blocks that the water table lifts with more than their weight and load."""
+    if scene.water is None:
+        return np.zeros(len(scene.blocks), bool)
+    water = _stress_on_edges(scene.water, manager.contacts.outlines, blocks.motion)
+    weight = blocks.inertia[:, 0] * scene.gravity[1] + blocks.steady_loads[:, 1]
+    can_float = blocks.is_free[:, 1] & ~blocks.is_removed
+    return can_float & (scene.thickness * water[:, 1] + weight > FLOATING_SHARE * np.abs(weight))
 
 
 def pressure_forces(

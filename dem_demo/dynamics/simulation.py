@@ -37,6 +37,7 @@ WIDE_MARGIN = 0.4  # fraction of the limit: a step below it stays stable as leve
 LENGTH_TOLERANCE = 1e-6  # relative: lengths that differ by rounding only
 TINY = 1e-300  # lower bound of a denominator
 CHECK_INTERVAL = 16  # steps between two checks of drives and of excavation stages
+TIME_ROUNDING = 1e-6  # of a time step: a stage that starts so little after a step starts at it
 RESTING_SPEED = 1e-4  # m/s
 RESTING_ACCELERATION = 0.1  # m/s2
 RESTING_FRACTION = 0.9  # of the blocks that must be at rest for the next stage
@@ -193,21 +194,29 @@ class Simulation:
     def _excavate(self) -> None:
         """Begin the next excavation stage when it is due, and reduce the support of removed blocks.
 
-        A stage without a start time is due when the blocks are at rest. Checked only every
-        CHECK_INTERVAL steps; the support is reduced in every step.
+        A stage with a start time is due in the step that reaches this time, which is the time that
+        the release of support is counted from. A stage without one is due when the blocks are at
+        rest, which is checked every CHECK_INTERVAL steps. The support is reduced in every step.
         """
         stages = self.scene.stages
+        now = self.time + self.dt  # to which the blocks have moved
         begun = int(np.isfinite(self.stage_start_times).sum())
-        is_checked = self.steps_since_change % CHECK_INTERVAL == 0
-        if is_checked and begun < len(stages):
-            stage = stages[begun]
-            if self._is_at_rest() if stage["start"] is None else self.time >= stage["start"]:
-                self._remove_blocks(stage["blocks"])
-                self.stage_start_times[begun] = self.time
+        if begun < len(stages):
+            start = stages[begun]["start"]
+            if start is None:
+                is_checked = self.steps_since_change % CHECK_INTERVAL == 0
+                is_due = is_checked and self._is_at_rest()
+                start = self.time
+            else:
+                is_due = now >= start - TIME_ROUNDING * self.dt
+                start = max(start, self.time)  # a stage before this one may have begun late
+            if is_due:
+                self._remove_blocks(stages[begun]["blocks"])
+                self.stage_start_times[begun] = start
                 begun += 1
         if self.blocks.support.any():
             stage_end = self.stage_start_times[begun - 1] + stages[begun - 1]["release_time"]
-            self._release_support(stage_end - self.time)
+            self._release_support(stage_end - now)
 
     def _remove_blocks(self, removed: list[int]) -> None:
         """Remove blocks, and keep the forces that they exert on the others as support."""
@@ -315,7 +324,10 @@ class Simulation:
         blocks = self.blocks
         manager = self.manager
         joints = self.joints
-        sliding = create_joints(scene, blocks, manager, joints)
+        try:
+            sliding = create_joints(scene, blocks, manager, joints)
+        except SceneError as error:
+            raise SceneError(f"blocks are drawn in each other: {error}") from None
         verdict = Verdict.NO_EQUILIBRIUM  # of blocks that touch nothing
         if scene.run.settle and joints.n and blocks.is_free.any():
             sliding, verdict = settle(scene, blocks, manager, joints, sliding)

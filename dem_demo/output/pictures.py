@@ -20,7 +20,7 @@ from jointlaw.support.pyplot import escape_math, style, written
 
 from ..scene import median_size, rotation
 from .monitors import shear_curve
-from .record import CREEP_RATE, RunRecord, report_lines
+from .record import CREEP_RATE, FAILURE_DISPLACEMENT, RunRecord, report_lines
 
 FIXED_COLOUR = "#8d8d8d"
 MARKED_COLOUR = "#c2187a"
@@ -47,6 +47,8 @@ MAX_LABELLED_BOLTS = 12  # in a picture with more bolts none bears its force
 CAPACITY_FRACTION = 0.999  # of its capacity: beyond it a bolt is drawn as being there
 MIN_DISTANCE = 1e-6  # m: smaller displacements have no colour and no arrow
 MIN_ARROW = 0.02  # of the largest displacement: smaller ones get no arrow
+ARROW_MARGIN = 1.0  # a block has an arrow up to this share beyond the end of the colours
+MAX_COLOUR_RATIO = 10.0  # largest displacement over the largest one of blocks that have not failed
 MARGIN = 0.07  # of the extent of the blocks
 LINE_WIDTHS = 0.7, 2.0, 1.2  # points: without stress, more at the scale; stress at the limit
 
@@ -70,10 +72,12 @@ class Pictures:
     title: of the scene, unless another one is given. marked (n,): blocks to be marked, and `mark`,
     their name in the legend; by default the blocks that are unstable at the start.
 
-    low, high (2,): visible range (m), of the blocks that move. max_distance: largest displacement
-    (m), for the colours. stress: normal stress (Pa), for the line widths: of the start, or of all
-    frames if no joint is closed at the start, because stresses of impacts would turn all other
-    joints into hair lines.
+    low, high (2,): visible range (m), of the blocks that move. max_distance: displacement (m) at
+    the end of the colours, the largest one; or the largest one of blocks that have not failed, if
+    failed blocks have moved more than ten times as far, so that small displacements stay visible
+    beside a falling block. largest_distance (m): of all blocks. stress: normal stress (Pa), for the
+    line widths: of the start, or of all frames if no joint is closed at the start, because stresses
+    of impacts would turn all other joints into hair lines.
     """
 
     def __init__(
@@ -95,8 +99,13 @@ class Pictures:
         self.low = low - margin
         self.high = high + margin
         self.free = np.array([not block.fixed for block in blocks])
-        self.max_distance = max(float(np.nanmax(record.distances[self.free])), MIN_DISTANCE)
         size = median_size(block for block in blocks if not block.fixed)
+        distances = record.distances[self.free]
+        self.largest_distance = float(np.nanmax(distances))
+        kept = distances[distances <= FAILURE_DISPLACEMENT * size]
+        of_kept = max(kept.max(initial=0.0), MIN_DISTANCE)
+        is_clipped = len(kept) > 0 and self.largest_distance > MAX_COLOUR_RATIO * of_kept
+        self.max_distance = of_kept if is_clipped else max(self.largest_distance, MIN_DISTANCE)
         self.arrow_scale = float(f"{0.5 * size / self.max_distance:.0e}")
         is_small = self.max_distance < 0.1
         self.length_factor, self.length_unit = (1e3, "mm") if is_small else (1.0, "m")
@@ -131,9 +140,13 @@ class Pictures:
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
         axes = figure.add_subplot()
         scale = Normalize(0.0, self.length_factor * self.max_distance)
+        label = f"displacement since the start ({self.length_unit})"
+        is_clipped = self.largest_distance > self.max_distance
+        if is_clipped:
+            label += f", failed blocks beyond the scale: up to {self.largest_distance:.2g} m"
         figure.colorbar(
             ScalarMappable(scale, DISPLACEMENT_COLOURS), ax=axes, location="bottom", aspect=50,
-            label=f"displacement since the start ({self.length_unit})",
+            label=label, extend="max" if is_clipped else "neither",
         )  # fmt: skip
         return figure, axes
 
@@ -168,7 +181,9 @@ class Pictures:
         shapes = outlines(record, i)
         displacements = record.displacements(i)
         self._draw_blocks(axes, shapes, displacements)
-        large = self.free & (np.hypot(*displacements.T) > MIN_ARROW * self.max_distance)
+        distances = np.hypot(*displacements.T)
+        is_on_scale = distances <= (1.0 + ARROW_MARGIN) * self.max_distance
+        large = self.free & is_on_scale & (distances > MIN_ARROW * self.max_distance)
         tails = record.motion[i][:2].T[large]
         arrows = self.arrow_scale * displacements[large]
         axes.quiver(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -161,6 +162,22 @@ class JointLaw(Law, kind="joint"):
                 f"{MIN_MATING_LENGTH} closure_range = {shortest:.4g} m, because shorter asperities "
                 "are lower than the closure; raise it, or lower closure_range"
             )
+
+        self._warn_if_it_jams()
+
+    def _warn_if_it_jams(self) -> None:
+        """Warn of facets so steep that the joint may bear tension after shear, without a bond."""
+        friction_angle = math.degrees(math.atan(self.asperity.mu))
+        steepest = 90.0 / self.orientation.a
+        if self.closure_only or self.bond is not None or friction_angle + steepest <= 90.0:
+            return
+        warnings.warn(
+            f"asperity.mu = {self.asperity.mu:g} with orientation.a = {self.orientation.a:g}: "
+            f"atan(mu) + 90/a = {friction_angle + steepest:.4g} degrees is more than 90, so that "
+            "sheared facets jam, and a joint that opens may bear tension without a bond "
+            "(docs/limits.md). Lower mu or raise a unless this is intended",
+            stacklevel=4,
+        )
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
         """Asperities in contact per m2 at this closure (m), Eq. 11.

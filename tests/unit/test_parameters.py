@@ -4,6 +4,7 @@ the numbers that the paper prints, in its own units, converted here."""
 import dataclasses
 import math
 import re
+import warnings
 
 import kinds
 import numpy as np
@@ -190,3 +191,20 @@ def test_numbers_of_the_paper(name):
     F, C = law.joint().update([law.closure_range, 0.1 * law.closure_range, 0.0])
     assert (F[:2] > 0).all()
     assert np.isfinite(C).all()
+
+
+def test_a_law_whose_facets_jam_warns():
+    """Where atan(mu) + 90/a exceeds 90 degrees, unless a bond bears tension; such joints pull."""
+    steep = {"a": 1.5, "mu": 0.7, "heights": None, "plane": 0.0}
+    with pytest.warns(UserWarning, match=r"atan\(mu\) \+ 90/a = 94\.99 degrees is more than 90"):
+        law = kinds.make_law(**steep)
+    joint = law.joint()
+    F = [joint.update(d)[0][0] for d in ([5e-7, 0.0], [0.0, 3e-6], *20 * [[-2e-7, 0.0]])]
+    assert min(F) < -1e-3 * max(F)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kinds.make_law(**steep, bond=jl.Bond(1e10, 1e10, 1e4, 1e6))
+        kinds.make_law(**steep | {"mu": 0.5})
+        kinds.make_law(**steep | {"plane": None}, closure_only=True)
+        for name in jl.presets.names():
+            jl.presets.load(name)

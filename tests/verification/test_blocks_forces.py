@@ -38,6 +38,9 @@ ROCKING = on_base(coulomb(0.5, 1e9, 8e8), [1.0, 0.5], at=[0.0, 0.279], angle=3.5
 ROCKING += "settle = false\nstep = 1e-4\n"
 # a block that flies up from its base: dashpots never pull
 FLYING = on_base(PLAIN, [1.0, 0.5], velocity=[0.0, 0.05]) + "step = 1e-4\ndashpot_normal = 0.3\n"
+# a block that lands on its base without slip, with unequal damping in closure and in shear
+DAMPED_SHEAR = on_base(PLAIN, [1.0, 0.5], velocity=[0.002, -0.01]) + "settle = false\nstep = 1e-4\n"
+DAMPED_SHEAR += "dashpot_normal = 0.3\ndashpot_shear = 0.1\n"
 GEOMETRY = (
     "position",
     "normal",
@@ -55,7 +58,8 @@ GEOMETRY = (
     ("name", "steps"),
     [("slope", (1, 40)), ("tilt", (1, 30)), ("stack", (1200, 30)), ("bridges-weathered", (20, 40)),
      ("shear-box", (300, 300)), pytest.param(ROCKING, (5, 200, 200), id="rocking"),
-     pytest.param(FLYING, (1, 1), id="flying")],
+     pytest.param(FLYING, (1, 1), id="flying"),
+     pytest.param(DAMPED_SHEAR, (2, 5), id="unequal-dashpots")],
 )  # fmt: skip
 def test_a_compiled_step_agrees_with_plain_numpy(name, steps):
     """Geometry, forces and torques, energies and velocities of some steps of a scene.

@@ -126,7 +126,8 @@ clear
     joint.update([closure, 0.0, 0.0])
     _, C = joint.update([0.0, 0.0, 0.0])
     push = 2 * 0.5 * np.sqrt(AREA * C[0, 0] * MASS / 2) * 0.3
-    assert moving["v_force"][0] == pytest.approx(expected + push, rel=1e-6)
+    # the stiffness is interpolated in a table of 32 stresses an octave
+    assert moving["v_force"][0] - expected == pytest.approx(push, rel=1e-4)
 
 
 def test_walls_of_frozen_spheres(plugin):

@@ -90,6 +90,52 @@ static Vector rotated(const Vector &a, const Vector &rotation)
   return sum(sum(a, sine, across), cosine, cross(rotation, across));
 }
 
+// Closure under this normal stress (Pa), or a lower one if yielding asperities do not reach it
+static double closure_under(const jlaw_law *law, double stress)
+{
+  double closure;
+  while (!std::isfinite(closure = jlaw_closure(law, stress))) stress *= 0.5;
+  return closure;
+}
+
+// Normal stiffness (Pa/m) of the unsheared joint as a function of the normal stress, for dashpots: a table,
+// since the tangent of every joint in every step would take half of the time of the law
+class NormalStiffness {
+ public:
+  bool is_empty() const { return table.empty(); }
+  void tabulate(const jlaw_law *law)
+  {
+    std::vector<double> state(jlaw_state_size(law));
+    const auto tangent = [&](double closure) {
+      const double d[3] = {closure, 0.0, 0.0}, zero[3] = {0.0, 0.0, 0.0};
+      double F[3], C[9];
+      std::fill(state.begin(), state.end(), 0.0);
+      jlaw_update(law, state.data(), state.data(), d, F, nullptr, nullptr, 0);
+      jlaw_update(law, state.data(), state.data(), zero, F, C, nullptr, 0);    // not of the step from zero
+      return std::max(C[0], 0.0);
+    };
+    under_tension = jlaw_tensile_opening(law) > 0.0 ? tangent(-1e-6 * jlaw_tensile_opening(law)) : 0.0;
+    for (int k = 0; k <= OCTAVES * PER_OCTAVE; k++)
+      table.push_back(tangent(closure_under(law, ldexp(1.0 + k % PER_OCTAVE / double(PER_OCTAVE),
+                                                       LOWEST + k / PER_OCTAVE))));
+  }
+  double at(double stress) const    // linear within a part of an octave
+  {
+    if (stress < 0.0) return under_tension;
+    int exponent;
+    const double mantissa = frexp(stress, &exponent);    // 0.5 to 1, or 0
+    const double x = (exponent - 1 - LOWEST + (2.0 * mantissa - 1.0)) * PER_OCTAVE;
+    if (!(x > 0.0 && stress > 0.0)) return table[0];
+    const int k = std::min(static_cast<int>(x), OCTAVES * PER_OCTAVE - 1);
+    return table[k] + std::min(x - k, 1.0) * (table[k + 1] - table[k]);
+  }
+
+ private:
+  static constexpr int LOWEST = -3, OCTAVES = 36, PER_OCTAVE = 32;    // from 1/8 Pa to 8.6 GPa
+  std::vector<double> table;
+  double under_tension = 0.0;
+};
+
 class PairJointlaw : public Pair {
  public:
   PairJointlaw(LAMMPS *);
@@ -111,6 +157,7 @@ class PairJointlaw : public Pair {
     std::string file;
     jlaw_law *law;
     int64_t id;    // hash of the fingerprint
+    NormalStiffness normal_stiffness;
   };
   // A contact or possible contact of owner i; the normal n points from i to j
   struct Contact {
@@ -123,7 +170,7 @@ class PairJointlaw : public Pair {
   // The step of a joint
   struct Step {
     Contact contact;
-    const jlaw_law *law;
+    const Law *law;
     int index, flag;    // index in the joints of the owner; index in joint_flags, -1 for a new joint
     bool is_still;      // of a setup: nothing has moved since the last step of the joint
     Vector slide, axis2, axis3;
@@ -176,7 +223,7 @@ class PairJointlaw : public Pair {
   std::vector<tagint> new_atoms;    // IDs of atoms that appeared since the last step, in order
   double rounding = 0.0;            // m, of positions between two runs
   std::vector<char> joint_flags;
-  std::vector<double> states, increments, tractions, tangents;    // of the steps
+  std::vector<double> states, increments, tractions;    // of the steps
   std::vector<double> scratch, stiffness;    // N/m, sum over the joints of each atom
   double warned_count = 0.0, max_time_step = 0.0, reported_time_step = 0.0, warned_time_step = 0.0;
   bool is_last_check = false;
@@ -219,7 +266,7 @@ class PairJointlaw : public Pair {
   bool find_slip(const Contact &, const double *, const int *, int, const Vector &, double, Vector &) const;
   void prepare_step(const Contact &, const int *, int);
   void perform_steps();
-  void apply_forces(const Step &, double *, const double *, const double *);
+  void apply_forces(const Step &, double *, const double *);
   void end_joint(int, int, bool);
   void refuse_other_commands() const;
   double expected_frequency_squared() const;
@@ -318,14 +365,6 @@ void PairJointlaw::settings(int narg, char **arg)
   if (allocated) memset(&setflag[0][0], 0, sizeof(int) * (atom->ntypes + 1) * (atom->ntypes + 1));
 }
 
-// Closure under this normal stress (Pa), or a lower one if yielding asperities do not reach it
-static double closure_under(const jlaw_law *law, double stress)
-{
-  double closure;
-  while (!std::isfinite(closure = jlaw_closure(law, stress))) stress *= 0.5;
-  return closure;
-}
-
 // Whether the shear stiffness of the closed joint is the same along axes 2 and 3: for three azimuths or
 // more a law is isotropic if c = 0
 static bool isotropic(const jlaw_law *law)
@@ -360,7 +399,7 @@ void PairJointlaw::coeff(int narg, char **arg)
       int read = law != nullptr, all = 0;
       MPI_Allreduce(&read, &all, 1, MPI_INT, MPI_MIN, world);
       if (!all) error->all(FLERR, "pair_coeff jointlaw: {}", message);
-      laws.push_back({arg[2], law, static_cast<int64_t>(hashed(HASH_START, jlaw_fingerprint(law)))});
+      laws.push_back({arg[2], law, static_cast<int64_t>(hashed(HASH_START, jlaw_fingerprint(law))), {}});
       if (opening < jlaw_tensile_opening(law))
         error->all(FLERR, "pair_coeff jointlaw: {} has tensile strength up to an opening of {} m, "
                    "but joints are deleted at opening {} m: give pair_style a larger opening", arg[2],
@@ -439,9 +478,11 @@ void PairJointlaw::init_style()
       error->all(FLERR, "pair_style jointlaw plane needs a molecule ID for each body: fix ID all "
                  "property/atom mol ghost yes");
   }
-  const int n = atom->ntypes;
   rows = 0;
-  for (const auto &law : laws) rows = std::max(rows, jlaw_state_size(law.law));
+  for (Law &law : laws) {
+    rows = std::max(rows, jlaw_state_size(law.law));
+    if (damping > 0.0 && law.normal_stiffness.is_empty()) law.normal_stiffness.tabulate(law.law);
+  }
   size = rows + EXTRA_SIZE;
 
   const uint64_t laws_hash = hash_laws();
@@ -749,7 +790,7 @@ void PairJointlaw::prepare_step(const Contact &c, const int *partners, int count
       && dot(slip, slip) <= rounding * rounding;
   if (is_still) {
     for (int k = 0; k < 3; k++) increments.push_back(0.0);
-    steps.push_back({c, law->law, index, flag, is_still, slide, axis2, cross(axis2, c.n)});
+    steps.push_back({c, law, index, flag, is_still, slide, axis2, cross(axis2, c.n)});
     return;
   }
   // axis 2 rotates with the bodies (in a plane about the normal only) and follows the normal
@@ -761,31 +802,27 @@ void PairJointlaw::prepare_step(const Contact &c, const int *partners, int count
   std::copy(axis2.begin(), axis2.end(), extra + AXIS2);
   std::copy(c.separation.begin(), c.separation.end(), extra + SEPARATION);
   for (const double d : {c.closure - state[0], dot(slip, axis2), dot(slip, axis3)}) increments.push_back(d);
-  steps.push_back({c, law->law, index, flag, is_still, slide, axis2, axis3});
+  steps.push_back({c, law, index, flag, is_still, slide, axis2, axis3});
 }
 
 // Advance all joints in the list, in groups of one law; then delete ended joints
 void PairJointlaw::perform_steps()
 {
-  const bool damps = damping > 0.0;
   tractions.resize(3 * steps.size());
-  tangents.resize(9 * steps.size());
   states.resize(rows * steps.size());
   for (size_t first = 0, n; first < steps.size(); first += n) {
-    const jlaw_law *law = steps[first].law;
+    const jlaw_law *law = steps[first].law->law;
     const size_t bytes = jlaw_state_size(law) * sizeof(double);
     const bool is_still = steps[first].is_still;
     const auto of = [&](size_t k) {
       return joints_of->of[steps[first + k].contact.i].joint(steps[first + k].index, size);
     };
-    const auto is_in_group = [&](const Step &step) { return step.law == law && step.is_still == is_still; };
+    const auto is_in_group = [&](const Step &step) { return step.law->law == law && step.is_still == is_still; };
     for (n = 0; first + n < steps.size() && is_in_group(steps[first + n]); n++)
       memcpy(states.data() + rows * n, of(n), bytes);
-    double *d = increments.data() + 3 * first, *F = tractions.data(), *C = tangents.data();
-    if (is_still && damps) jlaw_update_many(law, states.data(), rows, d, F, C, n);    // of a copy, for C
+    double *d = increments.data() + 3 * first, *F = tractions.data();
     for (size_t k = 0; is_still && k < n; k++) jlaw_traction(law, of(k), F + 3 * k);
-    const size_t done =
-        is_still ? n : jlaw_update_many(law, states.data(), rows, d, F, damps ? C : nullptr, n);
+    const size_t done = is_still ? n : jlaw_update_many(law, states.data(), rows, d, F, nullptr, n);
     if (done < n) {
       const Contact &c = steps[first + done].contact;
       char message[JLAW_MESSAGE];
@@ -795,7 +832,7 @@ void PairJointlaw::perform_steps()
     }
     for (size_t k = 0; k < n; k++) {
       if (!is_still) memcpy(of(k), states.data() + rows * k, bytes);
-      apply_forces(steps[first + k], of(k), F + 3 * k, C + 9 * k);
+      apply_forces(steps[first + k], of(k), F + 3 * k);
     }
   }
   for (const Visit &v : visits) {    // open too far, without partner, or separated without force
@@ -811,11 +848,11 @@ void PairJointlaw::perform_steps()
 }
 
 // Add forces and torques of a joint after its step
-void PairJointlaw::apply_forces(const Step &step, double *state, const double *F, const double *C)
+void PairJointlaw::apply_forces(const Step &step, double *state, const double *F)
 {
   const Contact &c = step.contact;
   const Vector &slide = step.slide, &axis2 = step.axis2, &axis3 = step.axis3;
-  const jlaw_law *law = step.law;
+  const jlaw_law *law = step.law->law;
   const int i = c.i, j = c.j;
   const bool fresh = step.flag < 0;
   const double dt = update->setupflag ? 0.0 : update->dt;
@@ -827,7 +864,7 @@ void PairJointlaw::apply_forces(const Step &step, double *state, const double *F
   double push = 0.0;    // also in a setup: from the present velocities and keywords
   if (damping > 0.0) {
     const double reduced = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
-    const double opening_speed = dot(slide, c.n), k = c.area * std::max(C[0], 0.0);
+    const double opening_speed = dot(slide, c.n), k = c.area * step.law->normal_stiffness.at(F[0]);
     const double limit = c.area * std::max(F[0], 0.0);
     push = std::max(-2.0 * damping * sqrt(k * reduced) * opening_speed, -limit);    // no tension
     // this velocity is between the forces of the last step and of this one

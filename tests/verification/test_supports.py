@@ -277,3 +277,21 @@ def test_supports_of_the_template_are_valid():
     scene = parse(active)
     assert len(scene.bolts) == len(scene.face_pressures) == 1
     assert not parse(text).bolts
+
+
+def test_factor_rises_with_cohesion_and_with_a_bolt():
+    """Toppling columns; the factor is below the bound of limit analysis each time."""
+    anchor = {"plunge": 0.0, "height": 3.9, "stiffness": 5e7, "capacity": 1e6, "pretension": 1e6}
+    plain = goodman_bray.scene_text(0.65)
+    cohesive = plain.replace("friction = 0.65", "friction = 0.65\ncohesion = 50000.0")
+    anchored = goodman_bray.scene_text(0.65, anchor=anchor)
+    stronger = goodman_bray.scene_text(
+        0.65, anchor=anchor | {"capacity": 1.5e6, "pretension": 1.5e6}
+    )
+    assert cohesive != plain
+    scenes = {name: parse(text) for name, text in locals().items() if isinstance(text, str)}
+    factors = {name: factor_of_safety(scene) for name, scene in scenes.items()}
+    for name, scene in scenes.items():
+        assert factors[name] < limit_factor(scene)
+    assert factors["plain"] < factors["anchored"] < factors["stronger"]
+    assert factors["plain"] < factors["cohesive"]

@@ -19,7 +19,7 @@ them at a stress of S/2 to S) and shears up to R, every second path smooth. Ever
 every sixteen. The generator has a fixed seed, so that every resolution follows the same paths.
 
 Dilated paths are random paths of joints that are open and pressed by their slopes alone: three to
-six legs, sheared to 0.3 to 10 R (three mating lengths at most) as they open, so that few facets,
+six legs, sheared to 0.3 to 7 R (three mating lengths at most) as they open, so that few facets,
 the steep ones that the shear closes, bear the load. The closures of a path are shifted together
 until its largest normal stress is S/2 to S.
 
@@ -62,7 +62,7 @@ MAX_SLIP_AT_CONSTANT_CLOSURE = 3.0  # R
 _JAMMING_ANGLE = 88.0  # degrees: a law with a larger friction angle has no slip tests
 _EXCURSION_SEED = 8
 _DILATED_SEED = 28
-_DILATED_SHEAR = (0.3, 10.0)  # R, of the farthest corner, but for the mating length
+_DILATED_SHEAR = (0.3, 7.0)  # R, of the farthest corner, but for the mating length
 _SHIFT_ITERATIONS = 20  # bisections of the shift of closures: to 1e-6 of the first bracket
 _SLIP_SEED = 18
 

@@ -253,7 +253,7 @@ class JointLaw(Law, kind="joint"):
 
         tolerance: largest error of the traction on a path, relative to the largest traction of the
         path, > 0: 0.01 is one per cent. It is met with a margin on the standard paths, on 128
-        random paths, on 32 paths of open joints that their slopes press, sheared to ten closure
+        random paths, on 32 paths of open joints that their slopes press, sheared to seven closure
         ranges, and in slip to three mating lengths, or 30 closure ranges, where friction is
         mobilised (`jointlaw.accuracy.suite`).
         stress: smallest and largest normal stress (Pa, > 0) of the scene. The tolerance then holds

@@ -188,7 +188,7 @@ def test_tolerances_hold_at_all_stresses_of_a_range(name):
 def test_tolerances_hold_on_dilated_joints():
     """Open joints pressed by their slopes, sheared to 15 closure ranges of their own stress.
 
-    The paths of the suite end at 10. A resolution for closed joints errs by more on these paths.
+    The paths of the suite end at 7. A resolution for closed joints errs by more on these paths.
     """
     law = replace(jl.presets.load("jing-replica"), plane=0.0)
     stress = (1e3, 5e6)

@@ -20,12 +20,12 @@ def _without_a_display(in_an_empty_folder):
 def _no_picture_shows_tex_source(monkeypatch):
     from matplotlib.figure import Figure
 
-    save, found = Figure.savefig, []
+    save, result = Figure.savefig, []
 
     def save_and_check(figure, *arguments, **options):
-        found.extend(figure_text.tex_source(figure))
+        result.extend(figure_text.tex_source(figure))
         return save(figure, *arguments, **options)
 
     monkeypatch.setattr(Figure, "savefig", save_and_check)
     yield
-    assert found == []
+    assert result == []

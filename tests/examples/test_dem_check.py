@@ -50,8 +50,8 @@ def test_number_of_blocks_is_estimated_and_refused_before_cutting(capsys):
         parse(rock(1e-4))
     sets = [JointSet(0.0, 0.2, "j"), JointSet(60.0, 0.25, "j"), JointSet(-50.0, 0.3, "j")]
     outline = np.array(SQUARE)
-    found = len(cut(outline, sets, 0, 1e-6).shapes)
-    assert estimate_block_count(outline, sets) == pytest.approx(found, rel=0.05)
+    result = len(cut(outline, sets, 0, 1e-6).shapes)
+    assert estimate_block_count(outline, sets) == pytest.approx(result, rel=0.05)
 
 
 def test_errors_name_duplicate_blocks_and_flat_polygons():

@@ -34,8 +34,8 @@ def text(page):
 
 def blocks(page, *languages):
     """Fenced blocks of a page in these languages."""
-    found = re.findall(r"^```(\w*)\n(.*?)^```$", text(page), re.DOTALL | re.MULTILINE)
-    return [block for language, block in found if language in languages]
+    result = re.findall(r"^```(\w*)\n(.*?)^```$", text(page), re.DOTALL | re.MULTILINE)
+    return [block for language, block in result if language in languages]
 
 
 def commands(page):
@@ -173,10 +173,10 @@ def test_readme_shares_its_first_part_with_the_first_page_of_the_site():
     pages = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pages)
     assert pages.PLACE in text("docs/index.md")
-    shown = pages.links(pages.first_part())
-    assert blocks("README.md", "python")[0] in shown
-    assert shown.count("```bash") == 2
-    targets = re.findall(r"\]\(([^)#\s]+)|src=\"([^\"]+)", shown)
+    displayed = pages.links(pages.first_part())
+    assert blocks("README.md", "python")[0] in displayed
+    assert displayed.count("```bash") == 2
+    targets = re.findall(r"\]\(([^)#\s]+)|src=\"([^\"]+)", displayed)
     targets = [link or picture for link, picture in targets]
     inside = [target for target in targets if "://" not in target and "examples/" not in target]
     inside = [
@@ -207,8 +207,8 @@ def test_what_a_page_names_exists(page):
 
 def test_every_picture_is_on_a_page():
     pictures = {path.name for path in (ROOT / "docs" / "pictures").iterdir()}
-    shown = {name for page in PAGES for name in re.findall(r"pictures/([\w.-]+)", text(page))}
-    assert pictures == shown
+    displayed = {name for page in PAGES for name in re.findall(r"pictures/([\w.-]+)", text(page))}
+    assert pictures == displayed
 
 
 @pytest.mark.parametrize("one", [one for one in fields(Run) if one.default not in (MISSING, None)])
@@ -264,13 +264,13 @@ def search_index(tmp_path_factory):
 def test_search_of_the_site_finds(search_index, term):
     """One page has all words of the term, after the stemming that the search applies to them."""
     language, frozen = search_index
-    found = [
+    result = [
         {index}
         if isinstance(index := frozen["terms"].get(stem, frozen["titleterms"].get(stem, [])), int)
         else set(index)
         for stem in (language.stem(word.lower()) for word in re.findall(r"\w+", term))
     ]
-    assert set.intersection(*found)
+    assert set.intersection(*result)
 
 
 def messages():

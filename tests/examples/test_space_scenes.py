@@ -92,8 +92,8 @@ def test_a_run_writes_tables_and_vtk_files(tmp_path, capsys):
     assert len(rows) == 28
     assert rows[1]["block"] == "row 1 brick 1"
     result = Statics(load("wall-3d")).solve()
-    moved = [[float(row[f"displacement_{axis}_m"]) for axis in "xyz"] for row in rows]
-    assert np.array(moved) == pytest.approx(result.displacement, abs=1e-18)
+    displaced = [[float(row[f"displacement_{axis}_m"]) for axis in "xyz"] for row in rows]
+    assert np.array(displaced) == pytest.approx(result.displacement, abs=1e-18)
     blocks = meshio.read(tmp_path / "vtk" / "blocks.vtu")
     assert sum(len(cells.data) for cells in blocks.cells) == 28
     displacement = np.concatenate(blocks.cell_data["displacement_m"])

@@ -58,13 +58,13 @@ def test_another_type_has_a_joint_of_its_own_law(plugin, processors):
     """`set type`: the sheared joint ends under load; a virgin joint of the other law begins."""
     change = f"run {STEPS}\nset atom 2 type 2\nrun 0\nrun 20\nset atom 1 type 2\nrun 0\n"
     text = run(plugin, PAIR + OUTPUT + change, processors)
-    sheared, changed, moved, none = last_rows(text)
+    sheared, changed, displaced, none = last_rows(text)
     assert sheared[SLIPS] == pytest.approx(SLIP, rel=TANGENTIAL)
     assert sheared[SHEAR] > 0.1 * sheared[NORMAL]
     expected = float(LAWS["block"].normal_stress(changed[CLOSURES]))
     assert changed[NORMAL] == pytest.approx(expected, rel=1e-9)
     assert changed[SHEAR] < 1e-9 * changed[NORMAL]
-    assert moved[SLIPS] == pytest.approx(SLIP / 10, rel=2 * TANGENTIAL)
+    assert displaced[SLIPS] == pytest.approx(SLIP / 10, rel=2 * TANGENTIAL)
     assert [row["c_joint[1]"] for row in (sheared, changed, none)] == [1, 1, 0]
     assert [row["c_joint[5]"] for row in (sheared, changed, none)] == [0, 1, 2]
     assert len(re.findall(r"1 joints under load were deleted .* another law", text)) == 2

@@ -182,8 +182,8 @@ def test_pieces_of_one_plane_equal_pure_python(scenes, worn):
     The law on the displacements of the plane, whatever the direction of a pair is. Rounding of
     positions: 1e-16 m of 1e-3 m.
     """
-    moved, F, force, measures = (np.array(part) for part in scenes["pieces"].values())
-    path = moved @ [[1, 0, 0], [0, -1, 0]]
+    displaced, F, force, measures = (np.array(part) for part in scenes["pieces"].values())
+    path = displaced @ [[1, 0, 0], [0, -1, 0]]
     joint = worn.joint()  # of id1 against id2
     exact = np.array([joint.update(d)[0] for d in np.diff(path, axis=0, prepend=np.zeros((1, 3)))])
     peak = np.abs(exact).max()
@@ -240,9 +240,9 @@ def test_save_reload_continue_equals_an_unbroken_run(scenes, live):
     out = scenes["reload"][live]
     assert ".load(file)" in scenes["told"][f"not loaded {live}"]
     assert "are attached or loaded in this process" in scenes["told"][f"not attached {live}"]
-    last, again, early = out["counts"]
+    last, repeated, early = out["counts"]
     assert early > 5
-    assert last == again
+    assert last == repeated
     unbroken = np.array(out["unbroken"])
     F = np.array(out["F"])
     assert np.abs(out["again"] - unbroken).max() < 1e-9 * np.abs(unbroken).max()

@@ -75,7 +75,7 @@ def test_what_is_no_distribution_of_heights_is_refused(make_law, exponential):
         def pdf(self, r):
             return 1e-6 * super().pdf(r)
 
-    for heights, told in {
+    for heights, message in {
         3: "has no overlap",
         ByAddress(1e-6): "must be equal, hash and print alike",
         Nameless(1e-6): "must be equal, hash and print alike",
@@ -85,7 +85,7 @@ def test_what_is_no_distribution_of_heights_is_refused(make_law, exponential):
         exponential(1e-6, 0.0, "both"): "heights.formation = 'both'",
         Falling(1e-6): "ascending heights",
     }.items():
-        with pytest.raises(ValueError, match=told):
+        with pytest.raises(ValueError, match=message):
             make_law(heights=heights)
 
 
@@ -134,12 +134,12 @@ def test_slope_curvature_and_energy_are_derivatives(case):
 
     # against what the curve would be with all asperities in touch; central differences leave 1e-8,
     # more where asperities begin, and the table is a cubic, so that Phi'' is good to 1e-3
-    for mine, other, most, size in (
+    for mine, alternative, most, size in (
         (slope, rate(lambda y: curve.force(y)[0]), 1e-6, y**0.5),
         (force, rate(curve.energy), 1e-6, y**1.5),
         (curve.curvature(y), rate(lambda y: curve.force(y)[1]), 2e-2, y**-0.5),
     ):
-        np.testing.assert_allclose(mine / size, other / size, atol=most, rtol=0)
+        np.testing.assert_allclose(mine / size, alternative / size, atol=most, rtol=0)
 
 
 def test_no_tension_anywhere(case):

@@ -38,7 +38,10 @@ def test_blocks_are_convex_wide_enough_and_fill_the_rock(seed):
     # Merging fills gaps of 1e-7 of the rock's size at most.
     assert sum(s.area for s in shapes) == pytest.approx(Polygon(SLOPE).area - lost, abs=1e-4)
     for i, shape in enumerate(shapes):
-        assert max((shape.intersection(other).area for other in shapes[:i]), default=0) < 1e-5
+        assert (
+            max((shape.intersection(alternative).area for alternative in shapes[:i]), default=0)
+            < 1e-5
+        )
     for block in blocks:
         edge = np.roll(block, -1, axis=0) - block
         normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)

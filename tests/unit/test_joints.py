@@ -108,17 +108,19 @@ def test_a_snapshot_restores_a_pool_and_what_is_refused_changes_none(law):
     pool.batch.update(np.eye(3) * 1e-7, where=pool.add("abc"))
     pool.remove("a")
     keys, state = pool.keys, pool.snapshot()
-    other = jl.JointPool(law)
-    other.add("xyz")
-    other.restore(keys, state)
+    alternative = jl.JointPool(law)
+    alternative.add("xyz")
+    alternative.restore(keys, state)
     with pytest.raises(ValueError, match="keys name 1 contacts, state holds 2 joints"):
-        other.restore("b", state)
+        alternative.restore("b", state)
     with pytest.raises(KeyError, match="x"):
-        other.remove(["b", "x"])
+        alternative.remove(["b", "x"])
     with pytest.raises(ValueError, match="mated=False"):
-        other.assign("cd", mated=False)
-    assert other.keys == ["b", "c"]
-    np.testing.assert_array_equal(other.batch.delta[other.places], pool.batch.delta[pool.places])
+        alternative.assign("cd", mated=False)
+    assert alternative.keys == ["b", "c"]
+    np.testing.assert_array_equal(
+        alternative.batch.delta[alternative.places], pool.batch.delta[pool.places]
+    )
 
 
 def walk(joints, rng, steps=30):
@@ -217,8 +219,8 @@ def test_joints_move_between_batches_and_go_on_as_before(any_law):
     np.testing.assert_array_equal(there.snapshot([0, 2]).values, stays.values)
     d = rng.normal(0.0, 1e-7, (5, any_law.tables.dim))
     F, _ = here.update(d)
-    moved, _ = there.update(d[[4, 1]], where=[3, 1])
-    np.testing.assert_array_equal(moved, F[[4, 1]])
+    displaced, _ = there.update(d[[4, 1]], where=[3, 1])
+    np.testing.assert_array_equal(displaced, F[[4, 1]])
     with pytest.raises(ValueError, match="state holds 2 joints, for 1 of the batch"):
         there.restore(here.snapshot([0, 1]), where=[0])
 

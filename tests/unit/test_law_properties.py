@@ -48,8 +48,8 @@ def test_secant_stiffness_is_that_of_a_joint_at_the_stress(name):
     law = LAWS[name]
     joint = law.joint(normal_stress=STRESS)
     stiffness, shear = law.secant_stiffness(STRESS)
-    few = 2e-3 if law.tables.yields else 1e-9  # few cells slip later than many
-    assert stiffness == pytest.approx(STRESS / joint.delta[0], rel=few)
+    sparse = 2e-3 if law.tables.yields else 1e-9  # few cells slip later than many
+    assert stiffness == pytest.approx(STRESS / joint.delta[0], rel=sparse)
     if law.dim == 1:
         assert shear == 0.0
     elif law.tables.asperities is None:
@@ -157,9 +157,9 @@ def test_a_law_with_an_element_of_its_own_runs_in_python(monkeypatch):
     change = batch.stored_energy - stored + batch.dissipated_energy
     assert change == pytest.approx(work, rel=0.1)  # first order in the step
     states = batch.snapshot()
-    other = CLAY.joints(3)
-    other.restore(states)
-    np.testing.assert_allclose(other.F, batch.F, rtol=1e-12)
+    alternative = CLAY.joints(3)
+    alternative.restore(states)
+    np.testing.assert_allclose(alternative.F, batch.F, rtol=1e-12)
 
 
 def test_hosts_in_c_and_the_native_kernel_refuse_it_by_name(monkeypatch):

@@ -81,8 +81,8 @@ def test_same_numbers_while_contacts_come_and_go(both, seed, track_dissipation):
     law = random_law(seed)
     slow, fast = (given_by(one, seed)[0] for one in both(lambda: law.joints(N, track_dissipation)))
     peak = max(np.abs(F).max() for F in slow if F.size)
-    for one, other in zip(slow, fast, strict=True):
-        assert worst(one, other, peak) < SAME
+    for one, alternative in zip(slow, fast, strict=True):
+        assert worst(one, alternative, peak) < SAME
 
 
 @pytest.mark.parametrize("seed", [3, 8])
@@ -167,10 +167,10 @@ def test_a_step_shows_what_the_state_then_amounts_to(both, seed):
     d, dim = path(law, seed, 12, N), law.tables.dim
     for batch in both(lambda: law.joints(N)):
         for increments in d:
-            shown = np.empty((N, 6 + dim))
-            batch.advance(engine.Step(increments, np.empty((N, dim)), None, measures=shown))
+            displayed = np.empty((N, 6 + dim))
+            batch.advance(engine.Step(increments, np.empty((N, dim)), None, measures=displayed))
             measures = *batch.measures()[:4], batch.dissipated_energy, batch.damage
-            np.testing.assert_array_equal(shown, np.column_stack([*measures, batch.delta]))
+            np.testing.assert_array_equal(displayed, np.column_stack([*measures, batch.delta]))
 
 
 def follows_the_reference(law, way):
@@ -185,14 +185,14 @@ def follows_the_reference(law, way):
         for alone, all_ in zip((F_alone, C_alone), batch.update([*others, d]), strict=True):
             np.testing.assert_array_equal(all_[-1], alone)
         mine, one = joint.snapshot().values[0], joint.measures()
-        other = reference.measures(k, state)
+        alternative = reference.measures(k, state)
         pairs = [
             (F[:, 0], F_alone), (C[..., 0], C_alone), (state[dim + 1 :, 0], mine[dim + 1 :]),
-            ([other.stored_energy[0], state[dim, 0]], [one.stored_energy, mine[dim]]),
+            ([alternative.stored_energy[0], state[dim, 0]], [one.stored_energy, mine[dim]]),
         ]  # fmt: skip
         off = np.maximum(off, [np.abs(np.subtract(a, b)).max() for a, b in pairs])
         peak = np.maximum(peak, [np.abs(a).max() for a, _ in pairs])
-        assert np.ravel(one[:3]) == pytest.approx(np.ravel(other[:3]), abs=1e-9)
+        assert np.ravel(one[:3]) == pytest.approx(np.ravel(alternative[:3]), abs=1e-9)
     assert (off < np.array([SAME, SAME_C, 3 * SAME, SAME]) * peak).all(), off / peak
 
 
@@ -376,8 +376,8 @@ def test_measures_of_a_list_are_in_its_order(make_law):
     whole = law.joints(N, track_dissipation=False)
     by_list = law.joints(N, track_dissipation=False)
     d = np.ascontiguousarray(path(law, 2, 6)[0])
-    shown = np.empty((N, 6 + law.dim))
-    whole.advance(engine.Step(d, np.empty_like(d), None, measures=shown))
+    displayed = np.empty((N, 6 + law.dim))
+    whole.advance(engine.Step(d, np.empty_like(d), None, measures=displayed))
     for joints in LISTS.values():
         m = len(joints)
         by_list.reset()
@@ -385,11 +385,11 @@ def test_measures_of_a_list_are_in_its_order(make_law):
             d[joints], np.empty((m, law.dim)), None, joints, measures=np.empty((m, 6 + law.dim))
         )
         by_list.advance(step)
-        assert step.measures.tobytes() == shown[joints].tobytes()
+        assert step.measures.tobytes() == displayed[joints].tobytes()
         by_list.reset()
         step.measures[:] = 0.0
         by_list.advance(step)  # repeated, with the list as it was sorted
-        assert step.measures.tobytes() == shown[joints].tobytes()
+        assert step.measures.tobytes() == displayed[joints].tobytes()
 
 
 @pytest.mark.parametrize("joints", [[3, 3], [5, 4, 3, 4], [*range(20), 7]])

@@ -232,21 +232,21 @@ def shared(line):
 
 def with_out(name, pair):
     """A pair of lines of a command, with a folder for the results if it writes into one."""
-    line, other = pair
+    line, alternative = pair
     if name in LINES or name in DEM_LINES:
-        line, other = (
+        line, alternative = (
             one if re.search("--out( |$)|^--", one) else f"{one} --out o" for one in pair
         )
-    return line, other
+    return line, alternative
 
 
 def probes(name, options, own, lines):
     """A pair of lines for each option of a command."""
-    found = own.get(name, {})
+    result = own.get(name, {})
     line = lines.get(name)
     for option in options:
-        if option in found:
-            yield option, with_out(name, found[option])
+        if option in result:
+            yield option, with_out(name, result[option])
         else:
             pair = shared(line).get(option) if line else None
             yield option, with_out(name, pair) if pair else None
@@ -359,15 +359,15 @@ FILE_TEXTS = {
 @pytest.fixture(scope="module")
 def states(tmp_path_factory):
     """Saved states of two scenes, as bytes by the names of their folders."""
-    found = {}
+    result = {}
     for name in ("scene", "other"):
         sim = dem_demo.Simulation(dem_demo.parse(FILE_TEXTS[f"{name}.toml"]))
         for _ in range(5):
             sim.step()
         folder = tmp_path_factory.mktemp(name)
         sim.save(folder)
-        found[f"{name}-state"] = (folder / "state.npz").read_bytes()
-    return found
+        result[f"{name}-state"] = (folder / "state.npz").read_bytes()
+    return result
 
 
 @pytest.fixture(scope="module")
@@ -424,13 +424,13 @@ def outcome(tmp_path, monkeypatch, capsys, states, real_fit):
 @pytest.mark.parametrize(("main", "pair"), CASES)
 def test_every_option_is_felt(main, pair, outcome):
     assert pair, "give the option a probe"
-    line, other = pair
-    if other.startswith("--"):
-        other = f"{line} {other}"
+    line, alternative = pair
+    if alternative.startswith("--"):
+        alternative = f"{line} {alternative}"
     if line not in PRESENT:
         PRESENT[line] = outcome(main, line)
         assert outcome(main, line) == PRESENT[line]  # nothing else makes a difference
     present = PRESENT[line]
-    felt = outcome(main, other)
+    felt = outcome(main, alternative)
     assert felt[0] == 0 or any(text in felt[2] for text in REFUSALS), felt[2]
     assert felt != present

@@ -94,9 +94,9 @@ def test_an_orientation_has_the_moments_that_it_is_made_from(a, b):
 
 def test_equal_laws_have_one_fingerprint(make_law):
     """-0.0 == 0.0: a state goes from one to the other."""
-    one, other = make_law(c=0.0), make_law(c=-0.0)
-    assert (one, one.fingerprint) == (other, other.fingerprint)
-    one.joint().restore(other.joint().snapshot())
+    one, alternative = make_law(c=0.0), make_law(c=-0.0)
+    assert (one, one.fingerprint) == (alternative, alternative.fingerprint)
+    one.joint().restore(alternative.joint().snapshot())
 
 
 @pytest.mark.parametrize("name", ["fast", "balanced", "fine", "reference"])
@@ -120,9 +120,9 @@ def test_the_mating_length_chooses_the_nodes(make_law, name):
 
 def test_the_default_closure_range_is_the_same_for_every_resolution(make_law):
     fine, balanced = (make_law(closure_range=None, resolution=r) for r in ("fine", "balanced"))
-    again = dataclasses.replace(balanced, resolution="fine")
-    assert fine == again
-    again.joint().restore(fine.joint().snapshot())
+    repeated = dataclasses.replace(balanced, resolution="fine")
+    assert fine == repeated
+    repeated.joint().restore(fine.joint().snapshot())
     # three rings against five: the law's own facets are not those of the default
     assert fine.closure(20e6) == pytest.approx(fine.closure_range, rel=0.02)
 

@@ -41,11 +41,11 @@ def unit_factor(label):
 
 def line_of(axis, label):
     """Points (n, 2) in SI units of the line with this label; "" for the only line of an axis."""
-    found = [line for line in axis.lines if label in ("", line.get_label())]
-    assert len(found) == 1, (label, [line.get_label() for line in axis.lines])
+    result = [line for line in axis.lines if label in ("", line.get_label())]
+    assert len(result) == 1, (label, [line.get_label() for line in axis.lines])
     x_label = axis.get_xlabel() or axis.figure.get_supxlabel()
     factors = unit_factor(x_label), unit_factor(axis.get_ylabel())
-    return found[0].get_xydata() * factors
+    return result[0].get_xydata() * factors
 
 
 def assert_line(axis, label, x, y):

@@ -96,8 +96,8 @@ def test_rocks_alone_and_saved_states_keep_their_files(tmp_path):
     sim.save(tmp_path / "state")
     for path in tmp_path.glob("*.csv"):
         path.unlink()
-    again = Simulation.load(tmp_path / "state")
-    assert same(again.scene) == same(sim.scene)
+    repeated = Simulation.load(tmp_path / "state")
+    assert same(repeated.scene) == same(sim.scene)
     assert same(alone(sim.scene, "rock")) == same(sim.scene)
 
 

@@ -39,10 +39,10 @@ def test_it_acts(pair):
     """Another value is another joint, but for the azimuth of a plane of a law without any."""
     tractions = []
     for law in pair:
-        joint, other = law.joint(), law.joint()
+        joint, alternative = law.joint(), law.joint()
         way = [joint.update(d)[0].tolist() for d in steps(law)]
         opens = np.outer(STEP * np.array([-0.15, -0.15, -0.5]), np.eye(law.dim)[0])
-        tractions.append([*way, *(other.update(d)[0].tolist() for d in opens)])
+        tractions.append([*way, *(alternative.update(d)[0].tolist() for d in opens)])
     law, base = pair
     isotropic = law.tables.asperities is None and law.plane != base.plane
     assert (tractions[0] != tractions[1]) != isotropic
@@ -70,8 +70,8 @@ def test_kernels_measures_and_bounds_agree(pair):
         assert np.abs(joints.F - F).max() <= 1e-9 * size  # a slider at its limit is cut again
         assert np.abs(reference.traction(k, state) - F_slow).max() <= 1e-9 * size
         slow = reference.measures(k, state)
-        for mine, other in zip(joints.measures(), slow, strict=True):
-            assert mine[0] == pytest.approx(other[0], rel=1e-9, abs=1e-12)
+        for mine, alternative in zip(joints.measures(), slow, strict=True):
+            assert mine[0] == pytest.approx(alternative[0], rel=1e-9, abs=1e-12)
         assert joints.max_stiffness()[0] == pytest.approx(reference.stiffness(k, state)[0])
         if (joints.damage == damage).all() or (damage == 1).all():  # while it weakens it is steeper
             norm, here = np.linalg.norm(C[0], 2) * (1.0 - 1e-9), joints.delta[0]
@@ -95,8 +95,8 @@ def test_first_loading(pair):
         joint, start = law.joint(), np.eye(law.dim)[0]
         for _ in range(parts):
             F, _ = joint.update(closure / parts * start)
-        few = 5e-3 if degrades else 2e-3 if law.tables.yields else 1e-9
-        assert F[0] == pytest.approx(law.normal_stress(closure), rel=few)
+        sparse = 5e-3 if degrades else 2e-3 if law.tables.yields else 1e-9
+        assert F[0] == pytest.approx(law.normal_stress(closure), rel=sparse)
         assert law.closure(law.normal_stress(closure)) == pytest.approx(closure, rel=1e-9)
 
 

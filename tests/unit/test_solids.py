@@ -150,8 +150,8 @@ def test_a_distant_rock_is_cut_alike():
     shift = np.array([6.0e5, 5.4e6, 800.0])
     far = [PlaneSet(**{**vars(one), "through": tuple(shift)}) for one in SETS]
     near = cut_rock(ROCK, SETS, 1, 0.3).solids
-    moved = cut_rock(ROCK.moved(shift), far, 1, 0.3).solids
-    volumes = [sorted(solid.volume for solid in solids) for solids in (near, moved)]
+    displaced = cut_rock(ROCK.moved(shift), far, 1, 0.3).solids
+    volumes = [sorted(solid.volume for solid in solids) for solids in (near, displaced)]
     assert volumes[0] == pytest.approx(volumes[1], rel=1e-6)
 
 

@@ -100,9 +100,9 @@ def test_roles_follow_the_numbers_of_blocks():
 def test_points_of_tilted_faces_lie_on_face_a(tilt):
     """Their closures are those of the tilted face, so a rebuild forgets nothing."""
     upper = box([1.0, 1.0, 1.0], [0.0, 0.0, 0.5])
-    for solids, moved in (((BASE, upper), 1), ((upper, BASE), 0)):
+    for solids, displaced in (((BASE, upper), 1), ((upper, BASE), 0)):
         surfaces = surfaces_of(*solids)
-        move(surfaces, moved, [0.0, 0.0, 0.0], [0.0, np.radians(tilt), 0.0])
+        move(surfaces, displaced, [0.0, 0.0, 0.0], [0.0, np.radians(tilt), 0.0])
         points = find_contacts(surfaces, np.full(2, REACH), 0.1)
         normal = surfaces.normal[points.face_a]
         start = np.array([surfaces.ring(face)[0] for face in points.face_a])
@@ -170,9 +170,9 @@ def test_separation_of_solids():
         surfaces = surfaces_of(one, box([1.0, 1.0, 1.0], [shift, 0.1, 0.2]))
         assert surfaces.separations(pairs, 1e-9) == pytest.approx([expected], abs=1e-14)
     turn = Rotation.from_rotvec([np.pi / 4, 0.0, 0.0]).as_matrix()  # an edge along x on top
-    other = Rotation.from_rotvec([0.0, np.pi / 4, 0.0]).as_matrix()  # an edge along y below
+    alternative = Rotation.from_rotvec([0.0, np.pi / 4, 0.0]).as_matrix()  # an edge along y below
     for gap in (-0.01, 0.01):
-        upper = one.rotated(other).moved(np.array([0.0, 0.0, np.sqrt(2.0) + gap]))
+        upper = one.rotated(alternative).moved(np.array([0.0, 0.0, np.sqrt(2.0) + gap]))
         surfaces = surfaces_of(one.rotated(turn), upper)
         assert surfaces.separations(pairs, 1e-9) == pytest.approx([gap], abs=1e-14)
 
@@ -193,7 +193,7 @@ def test_rows_are_the_rates_of_closure_and_shears():
     assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (k, 1, 1)))
     start = [surfaces.position.copy(), surfaces.rotation.copy()]
     motions = 1e-6 * rng.standard_normal((2, 6))  # displacement; rotation about principal axes
-    moved = []
+    displaced = []
     for sign in (1.0, -1.0):
         surfaces.position[:], surfaces.rotation[:] = start
         for i in range(2):
@@ -204,8 +204,8 @@ def test_rows_are_the_rates_of_closure_and_shears():
             local = np.einsum("kij,ki->kj", start[1][block], arm)
             turned = np.einsum("kij,kj->ki", surfaces.rotation[block], local)
             at.append(surfaces.position[block] + turned)
-        moved.append(at[0] - at[1])
-    relative = 0.5 * (moved[0] - moved[1])  # of a to b at the points
+        displaced.append(at[0] - at[1])
+    relative = 0.5 * (displaced[0] - displaced[1])  # of a to b at the points
     expected = np.einsum("kci,ki->kc", axes, relative) * [-1.0, 1.0, 1.0]
     both = np.concatenate([motions[points.block_a], motions[points.block_b]], axis=1)
     assert np.einsum("kcm,km->kc", rows.kinematics, both) == pytest.approx(expected, abs=1e-15)
@@ -224,8 +224,8 @@ def test_axis_2_of_both_sides_of_a_plane():
     normals[10:, 2] = 0.0  # vertical planes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     angles = rng.uniform(-180, 180, 20)
-    one, other = turned_from_dip(normals, angles), turned_from_dip(-normals, angles)
-    assert one == pytest.approx(other, abs=1e-12)
+    one, alternative = turned_from_dip(normals, angles), turned_from_dip(-normals, angles)
+    assert one == pytest.approx(alternative, abs=1e-12)
     assert np.einsum("ki,ki->k", one, normals) == pytest.approx(np.zeros(20), abs=1e-15)
 
 

@@ -82,8 +82,10 @@ def test_a_rock_is_cut_and_its_joints_have_the_laws_and_directions_of_their_sets
 
 
 def test_laws_of_a_rock_can_be_replaced_in_another_like_it():
-    other = '[[rock]]\nname = "copy"\nlike = "mass"\nat = [50, 0, 4]\nlaws = { plain = "other" }\n'
-    scene = parse(LAWS + MASS + SETS + other)
+    alternative = (
+        '[[rock]]\nname = "copy"\nlike = "mass"\nat = [50, 0, 4]\nlaws = { plain = "other" }\n'
+    )
+    scene = parse(LAWS + MASS + SETS + alternative)
     names = [{law for b in r.blocks for law in scene.blocks[b].face_laws} for r in scene.rocks]
     assert names == [{None, "plain", "other"}, {None, "other"}]
 

@@ -67,8 +67,8 @@ def test_band_beyond_the_data_includes_the_error_of_extrapolation(grimsel):
     np.testing.assert_allclose(error, 2 * abs(misses[2]) * np.array([1.0, 2.0]), atol=2e-3)
     _, high = fit.band(closure[8] + np.array([0.0, 1e-12]))
     assert high[0] == pytest.approx(high[1], rel=1e-3)  # the band is continuous
-    few = jl.fit_curves([jl.ClosureCurve(stress[:5], closure[:5])])
-    assert (few.extrapolation_error(u) == 0).all()
+    sparse = jl.fit_curves([jl.ClosureCurve(stress[:5], closure[:5])])
+    assert (sparse.extrapolation_error(u) == 0).all()
 
 
 def test_two_fractures_are_predicted_within_the_band():

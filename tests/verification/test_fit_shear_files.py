@@ -352,16 +352,18 @@ NOISE = 0.005  # of the largest shear stress
 
 def test_meaning_of_a_law_warns_of_asperities_of_the_size_of_a_specimen(law):
     """With 400 asperities on the specimen it does not, with a quarter of them it does."""
-    few = replace(law, asperity_density=1e4)
-    assert "**" not in " ".join(describe(few, [1e6], specimen_size=0.2))
-    warned = " ".join(describe(few, [1e6, 5e6], specimen_size=0.1))
+    sparse = replace(law, asperity_density=1e4)
+    assert "**" not in " ".join(describe(sparse, [1e6], specimen_size=0.2))
+    warned = " ".join(describe(sparse, [1e6, 5e6], specimen_size=0.1))
     assert "10 % of the specimen:** it would have about 100," in warned
     assert "No closure was measured" in warned
-    assert "product of asperity_density and K" in " ".join(describe(few, [1e6], has_closure=True))
-    assert "if it has 100 mm" in " ".join(describe(few, [1e6]))
+    assert "product of asperity_density and K" in " ".join(
+        describe(sparse, [1e6], has_closure=True)
+    )
+    assert "if it has 100 mm" in " ".join(describe(sparse, [1e6]))
     # at the closure of a stress that yielding asperities never reach there is no figure
     soft = replace(law.asperity, yield_interference=1e-9)
-    assert "| 5e+03 | " in " ".join(describe(replace(few, asperity=soft), [5e9]))
+    assert "| 5e+03 | " in " ".join(describe(replace(sparse, asperity=soft), [5e9]))
 
 
 @pytest.mark.slow
@@ -470,9 +472,11 @@ def test_default_parameters_of_shear_tests(law):
     response = respond(build_law(undegraded, problem.settings), 1e6)
     assert response.normal_stiffness == pytest.approx(50e9, rel=1e-3)
     # other heights need another density for this stiffness
-    other = default_problem(curves, fixed={"alpha": 1.0}).values
-    assert other["asperity_density"] != pytest.approx(density, rel=0.1)
-    stiffness = respond(build_law(other | {"degradation_stress": np.inf}, problem.settings), 1e6)
+    alternative = default_problem(curves, fixed={"alpha": 1.0}).values
+    assert alternative["asperity_density"] != pytest.approx(density, rel=0.1)
+    stiffness = respond(
+        build_law(alternative | {"degradation_stress": np.inf}, problem.settings), 1e6
+    )
     assert stiffness.normal_stiffness == pytest.approx(50e9, rel=1e-3)
     # two stresses, of which one was tested twice, do not show how the envelope bends
     two = default_problem(curves[:3])

@@ -248,5 +248,5 @@ def test_plain_friction_has_the_tractions_of_the_law(dim, reduction, friction, c
     np.add.at(by_hand, block_a, -force[:, :dof])
     np.add.at(by_hand, block_b, -force[:, dof:])
     scale = np.abs(by_hand).max()
-    for found in forces:
-        np.testing.assert_allclose(found, by_hand, atol=1e-11 * scale)
+    for result in forces:
+        np.testing.assert_allclose(result, by_hand, atol=1e-11 * scale)

@@ -141,15 +141,15 @@ SCENES = {  # text, steps before the state is saved, steps of the resumed run
 @pytest.fixture(scope="module")
 def simulations():
     """For each scene its simulation at the moment of saving, and the steps of the resumed run."""
-    found = {}
+    result = {}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(simulation, "MAX_HALVINGS", 1)
         for name, (text, before, after) in SCENES.items():
             sim = Simulation(parse(text))
             for _ in range(before):
                 sim.step()
-            found[name] = sim, after
-        yield found
+            result[name] = sim, after
+        yield result
 
 
 @pytest.fixture(scope="module")
@@ -219,20 +219,20 @@ def left_out(name, sim):
     if is_like and not np.allclose(start, value, rtol=ROUNDING, atol=0.0, equal_nan=True):
         return saved | {key: start}, True
     if value.dtype.kind == "U":
-        other = np.array("another text")
+        alternative = np.array("another text")
     elif np.any(value != zeros):
-        other = zeros
+        alternative = zeros
     else:
-        other = zeros + np.ones((), value.dtype)
-    return saved | {key: other}, False
+        alternative = zeros + np.ones((), value.dtype)
+    return saved | {key: alternative}, False
 
 
 @pytest.mark.parametrize("name", [*entries()])
 def test_every_entry_of_a_saved_state_matters(name, simulations, expected, tmp_path):
     """In one of the scenes where the entry is not as in a new simulation."""
     states = {scene: left_out(name, sim) for scene, (sim, _) in simulations.items()}
-    states = {scene: found for scene, found in states.items() if found}
-    new = {scene: found for scene, found in states.items() if found[1]}
+    states = {scene: result for scene, result in states.items() if result}
+    new = {scene: result for scene, result in states.items() if result[1]}
     assert new or name in AS_AT_STEP_0, "no scene has another value than a new simulation"
     for scene, (saved, _) in (new or states).items():
         sim, steps = simulations[scene]
@@ -243,13 +243,13 @@ def test_every_entry_of_a_saved_state_matters(name, simulations, expected, tmp_p
 
 def numbers(sim):
     """All arrays and numbers of a simulation, by path."""
-    found = {}
+    result = {}
     for part in PARTS:
         holder = attrgetter(part)(sim) if part else sim
         for name, value in vars(holder).items():
             if isinstance(value, np.ndarray | float | int):
-                found[f"{part}.{name}".strip(".")] = np.array(value)
-    return found
+                result[f"{part}.{name}".strip(".")] = np.array(value)
+    return result
 
 
 def differing(one, other):
@@ -271,17 +271,20 @@ def test_a_restored_simulation_is_the_saved_one(scene, simulations, tmp_path):
     for saved in (state, pending):
         before = Simulation(sim.scene, saved=saved)
         before.save(tmp_path)
-        for again in (before, Simulation.load(tmp_path)):
-            assert not differing(again.state(), saved)
-            found = numbers(again)
+        for repeated in (before, Simulation.load(tmp_path)):
+            assert not differing(repeated.state(), saved)
+            result = numbers(repeated)
             expected = numbers(sim)
             # A restored traction is the one of a zero increment, the other one of the last step:
             # they may differ by rounding. The next step replaces both.
             np.testing.assert_allclose(
-                found.pop("joints.traction"), expected.pop("joints.traction"), rtol=1e-12, atol=1e-6
+                result.pop("joints.traction"),
+                expected.pop("joints.traction"),
+                rtol=1e-12,
+                atol=1e-6,
             )
             expected["manager.needs_rebuild"] = saved["manager.needs_rebuild"]
-            assert not differing(found, expected) - NO_STATE - OVERWRITTEN
+            assert not differing(result, expected) - NO_STATE - OVERWRITTEN
 
 
 @pytest.mark.parametrize("scene", SCENES)

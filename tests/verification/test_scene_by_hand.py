@@ -188,7 +188,7 @@ class Flight:
 
     def summary(self):
         flown, ground_moved, *_ = self.at(self.times[-1])
-        moved = np.hypot(*(flown - ground_moved))
+        displaced = np.hypot(*(flown - ground_moved))
         x, y = self.start
         return {
             "steps": 200,
@@ -207,10 +207,10 @@ class Flight:
                     "state": "displacing",
                     "blocks": 1,
                     "settlement_m": pytest.approx(0.0, abs=ROUNDING),
-                    "displacement_m": pytest.approx(moved),
+                    "displacement_m": pytest.approx(displaced),
                     "failed_blocks": 1,
                     "failure_displacement_m": pytest.approx(0.1 * np.sqrt(self.box.prod())),
-                    "creep_m_per_s": pytest.approx(moved / 0.2),  # the run is shorter than 1 s
+                    "creep_m_per_s": pytest.approx(displaced / 0.2),  # the run is shorter than 1 s
                 }
             ],
         }
@@ -331,10 +331,10 @@ class Stack:
         return 0.0
 
     def monitors(self, t):
-        moved = self.place_1 - [1.0, 0.5]
-        moved += self.rotation * np.array([0.0, self.point[0] - 1.0])
+        displaced = self.place_1 - [1.0, 0.5]
+        displaced += self.rotation * np.array([0.0, self.point[0] - 1.0])
         pa = self.stress_tolerance
-        x, y = self.point + moved
+        x, y = self.point + displaced
         return {
             "stack 1: base angle_deg": (0.0, ROUNDING),
             "stack 1: normal_Pa": (self.normal / self.width, pa),
@@ -351,7 +351,7 @@ class Stack:
             "point 1: y_m": (y, ROUNDING),
             "point 1: vx_m/s": (0.0, ROUNDING),
             "point 1: vy_m/s": (0.0, ROUNDING),
-            "point 1: displacement_m": (np.hypot(*moved), ROUNDING),
+            "point 1: displacement_m": (np.hypot(*displaced), ROUNDING),
         }
 
     def blocks(self):

@@ -164,9 +164,9 @@ def test_a_scene_of_the_plane_extruded(angle):
     assert factor_of_safety(statics, tolerance=0.003) == pytest.approx(factor, rel=0.005)
     if angle == 35.0:
         unstable = strength._unstable_blocks(in_plane)
-        found = list_blocks(in_space, statics.solve().unstable)
+        result = list_blocks(in_space, statics.solve().unstable)
         assert len(unstable) > 20
-        assert [one["block"] for one in found] == [one["block"] for one in unstable]
+        assert [one["block"] for one in result] == [one["block"] for one in unstable]
 
 
 def test_the_numbers_of_blocks_do_not_matter():
@@ -184,9 +184,11 @@ def test_the_numbers_of_blocks_do_not_matter():
     for order in orders:
         scene = parse(text + "".join(parts[i] for i in order))
         assert isinstance(scene.laws["joint"], type(law))
-        moved = Statics(scene).solve()
-        assert moved.verdict is Verdict.EQUILIBRIUM
-        results.append(dict(zip([b.name for b in scene.blocks], moved.displacement, strict=True)))
+        displaced = Statics(scene).solve()
+        assert displaced.verdict is Verdict.EQUILIBRIUM
+        results.append(
+            dict(zip([b.name for b in scene.blocks], displaced.displacement, strict=True))
+        )
     for name, displacement in results[0].items():
         assert results[1][name] == pytest.approx(displacement, abs=1e-15)
 

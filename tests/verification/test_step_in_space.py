@@ -148,12 +148,12 @@ def test_block_on_an_incline(degrees, azimuth):
     block, down = on_incline(degrees, azimuth)
     place = block.motion[:2, 1].copy()
     time = block.run(0.25)
-    moved = block.motion[:2, 1] - place
+    displaced = block.motion[:2, 1] - place
     dip = np.radians(degrees)
     acceleration = 9.81 * max(np.sin(dip) - FRICTION * np.cos(dip), 0.0)
     expected = 0.5 * acceleration * time**2
-    assert moved @ down == pytest.approx(expected, rel=1e-6, abs=1e-11)
-    assert moved @ [-down[1], down[0]] == pytest.approx(0.0, abs=1e-12)
+    assert displaced @ down == pytest.approx(expected, rel=1e-6, abs=1e-11)
+    assert displaced @ [-down[1], down[0]] == pytest.approx(0.0, abs=1e-12)
     assert block.motion[3:6, 1] == pytest.approx(np.zeros(3), abs=1e-12)  # does not turn
     assert abs(block.balance.error) < 1e-7
     if expected > 0:

@@ -245,8 +245,8 @@ def test_picture_of_a_scan(surface, tmp_path):
     # along the rows and across them; the facets of the summits are a part of the surface, which
     # has steps between its squares too
     for angle, slope in zip((0.0, np.pi / 2), fit.slopes, strict=True):
-        found = np.tan(np.radians(np.interp(angle, azimuth, measured)))
-        assert found == pytest.approx(slope, rel=0.25)
+        result = np.tan(np.radians(np.interp(angle, azimuth, measured)))
+        assert result == pytest.approx(slope, rel=0.25)
     _, law = lines["rms slope of the law"].T
     assert law[0] == pytest.approx(np.degrees(np.arctan(rms_slope(fit.orientation))))
     (density,) = depths.lines

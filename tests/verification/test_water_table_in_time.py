@@ -59,16 +59,16 @@ def test_loads_are_those_of_a_scene_with_the_table_of_that_time():
 def path_of_wall(low, high):
     """Displacement (m) of a rigid wall in 0.3 s, by small steps of Newton's second law."""
     mass = DENSITY * WIDTH * HEIGHT
-    moved = speed = 0.0
+    displaced = speed = 0.0
     dt = 1e-4
     for i in range(3000):
         level = min(low + (high - low) * i * dt / 0.1, high)
-        depth = level * (1 - moved / WIDTH)  # at the wall, where the table falls to the right
-        normal = mass * 9.81 - WATER * depth * (WIDTH - moved) / 2
+        depth = level * (1 - displaced / WIDTH)  # at the wall, where the table falls to the right
+        normal = mass * 9.81 - WATER * depth * (WIDTH - displaced) / 2
         force = WATER * depth**2 / 2 - FRICTION * normal
         speed = max(speed + dt * force / mass, 0.0)
-        moved += dt * speed
-    return moved
+        displaced += dt * speed
+    return displaced
 
 
 def test_a_wall_slides_when_the_thrust_exceeds_friction():
@@ -85,8 +85,8 @@ def test_a_wall_slides_when_the_thrust_exceeds_friction():
     assert sim.blocks.motion[0, 1] - start < 1e-4
     assert np.abs(sim.blocks.velocity[:, 1]).max() < 1e-3
     until(sim, 0.8)
-    moved = sim.blocks.motion[0, 1] - start
-    assert moved == pytest.approx(path_of_wall(low, high), rel=0.03)
+    displaced = sim.blocks.motion[0, 1] - start
+    assert displaced == pytest.approx(path_of_wall(low, high), rel=0.03)
     assert abs(sim.energy_balance.error) < 1e-3
 
 

@@ -28,9 +28,9 @@ class JointState:
         return len(self.values)
 
     def require(self, fingerprint: str) -> None:
-        """Raise ValueError unless the law with this fingerprint wrote the state.
+        """Require that the law with this fingerprint wrote the state.
 
-        The message distinguishes another version of the discretisation from other parameters.
+        Raises ValueError if another law wrote it; the message distinguishes another version of the discretisation from other parameters.
         """
         if self.fingerprint == fingerprint:
             return

@@ -140,7 +140,10 @@ def closed_states(law, fraction):
             lambda law: law.step(closed_states(law, 0.0), closed_states(law, 1.1)[:, :3]),
             BEYOND,
         ),
-        (lambda law: law.step(closed_states(law, 1.1), np.zeros((2, 3))), BEYOND),
+        (
+            lambda law: law.step(closed_states(law, 1.1), np.zeros((2, 3))),
+            r"joint 1: delta\[0\] .* out of bounds",
+        ),
         (
             lambda law: law.joints(3, normal_stress=[1e6, 2e6]),
             r"normal_stress has shape \(2,\): give one or \(3,\)",

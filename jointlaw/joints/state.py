@@ -30,7 +30,8 @@ class JointState:
     def require(self, fingerprint: str) -> None:
         """Require that the law with this fingerprint wrote the state.
 
-        Raises ValueError if another law wrote it; the message distinguishes another version of the discretisation from other parameters.
+        Raises ValueError if another law wrote it; the message distinguishes another version of the
+        discretisation from other parameters.
         """
         if self.fingerprint == fingerprint:
             return

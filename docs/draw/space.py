@@ -52,7 +52,7 @@ def draw_scene(axes, name):
     axes.set_xlim(LOW[0], HIGH[0])
     axes.set_ylim(LOW[1] - 5, HIGH[1])
     axes.set_zlim(LOW[2], HIGH[2] + 11)
-    axes.set_box_aspect((34, 26, 24), zoom=1.3)
+    axes.set_box_aspect((34, 26, 24), zoom=1.08)
     axes.view_init(**VIEW)
     axes.set_axis_off()
     way = "along" if name == "wedge" else "across"

@@ -15,9 +15,10 @@ _TOLERANCE = 1e-14  # of the stress: rounding
 def preload(batch: JointBatch, normal_stress: ArrayLike) -> None:
     """Close virgin joints to this normal stress (Pa, >= 0), one for all or (n,), without shear.
 
-    The stress is met to rounding by the cells of the joints. `law.closure` is the limit of many
-    cells, which differs if asperities yield. Raises ValueError as `JointLaw.closure` does, and for
-    another shape.
+    The stress is met to rounding by the cells of the joints in one step. `law.closure` is the limit
+    of many cells and small steps. It differs if asperities yield, because few cells slip later, and
+    if their slopes decrease by stress, because one step turns the planes once. Raises ValueError as
+    `JointLaw.closure` does, and for another shape.
     """
     law = batch.law
     n = len(batch)
@@ -26,7 +27,7 @@ def preload(batch: JointBatch, normal_stress: ArrayLike) -> None:
         raise ValueError(f"normal_stress has shape {shape}: give one or ({n},)")
     closure = law.closure(normal_stress)
     step = np.outer(closure, np.eye(law.dim)[0])
-    if law.tables.yields:  # the few cells of a joint slip later than `closure` assumes
+    if law.tables.yields or law.tables.degrades_by_stress:  # one step differs from `closure`
         closes = step[:, 0] > 0
         stress = np.ravel(normal_stress)[closes]
         condition = NormalCondition(stress, stress)

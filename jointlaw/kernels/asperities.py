@@ -188,6 +188,8 @@ class AsperityElement(Element):
         q = old.q
         retention = old.slope_retention
         dissipated = np.zeros(d.shape[1])
+        if k.slopes_change:
+            updated.lost_slopes[:] = old.lost_slopes
         if k.degrades:
             updated.lost_slopes[:] = degrade_slopes(k, old)
             retention = updated.slope_retention

@@ -68,8 +68,9 @@ class Element(ABC):
         """Advance joints by a displacement increment.
 
         delta: displacement (dim, B) in m before the step; d: increment (dim, B) in m; state: rows
-        before the step; new: rows after the step, which are written. Returns the traction after
-        the step, the dissipated energy, and with `tangent` the consistent tangent dF/dd.
+        before the step; new: rows after the step, which are written; their contents before are
+        arbitrary. Returns the traction after the step, the dissipated energy, and with `tangent`
+        the consistent tangent dF/dd.
         """
 
     @abstractmethod

@@ -113,6 +113,11 @@ class LawTables:
         return self.asperities is not None and self.asperities.yields
 
     @property
+    def degrades_by_stress(self) -> bool:
+        """Whether asperities degrade by the contact stress."""
+        return self.asperities is not None and self.asperities.degrades_by_stress
+
+    @property
     def interlock_decays(self) -> bool:
         """Whether the interlock decays with slip, over the mating length."""
         return self.asperities is not None and self.asperities.interlock_decays

@@ -539,7 +539,6 @@ JL_INLINE void jl_degrade_by_stress(const jlaw_law *law, jl_states n, jl_joint_s
     }
     jl_contact_stress(law, n, m, 1.0 - lost, k, &stress, &rate);
   }
-  m->retention_rate = jl_broadcast_joint(0.0);
   for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
     const jl_stress_search *at = search + l;
     const double u = at->u;
@@ -1005,6 +1004,7 @@ JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3
     m.end = jl_offset_at(law, m.to[1], m.to[2]);
   }
   m.slopes_middle = m.slopes_end = m.slopes1;
+  m.retention_rate = jl_broadcast_joint(0.0);
   if (k.degrades_by_stress) jl_degrade_by_stress(law, n, &m, k);
   for (int i = 0; i < JL_PARTIAL_SUMS; i++) {
     for (int j = 0; j < 3; j++) sum[i].F[j] = jl_broadcast(0.0);

@@ -202,6 +202,8 @@ def test_joints_start_closed_to_a_normal_stress(law):
     stress = law.normal_stress(1e-6) * np.array([1e-3, 0.0, 1.0, 0.2])
     batch = law.joints(4, normal_stress=stress)
     np.testing.assert_allclose(batch.F[:, 0], stress, rtol=1e-12)
+    at_rest, _ = batch.trial(np.zeros((4, law.dim)))
+    np.testing.assert_allclose(at_rest[:, 0], stress, rtol=1e-12)
     assert not batch.delta[:, 1:].any()
     assert batch.delta[1, 0] == 0.0
     for alike in (law.joint(normal_stress=stress[3]), law.joints(2, normal_stress=stress[3])):

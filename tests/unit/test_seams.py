@@ -81,6 +81,26 @@ def test_kernels_measures_and_bounds_agree(pair):
         damage = joints.damage
 
 
+def test_a_step_reads_none_of_the_rows_that_it_writes(pair):
+    law, _ = pair
+    k = law.tables
+    state = np.zeros((law.state_size, 1))
+    for d in steps(law)[:9]:
+        state, _, _ = reference.step(k, state, d[:, None], False)
+    delta = state[: law.dim]
+    first_row = law.dim + 1
+    for element in k.elements:
+        rows = state[first_row : first_row + sum(element.rows.values())]
+        first_row += len(rows)
+        written = rows.copy()
+        unset = np.full_like(rows, np.nan)
+        d = steps(law)[9][:, None]
+        expected = element.step(delta, d, rows, written, False)
+        response = element.step(delta, d, rows, unset, False)
+        np.testing.assert_array_equal(response.F, expected.F)
+        np.testing.assert_array_equal(unset, written)
+
+
 def test_first_loading(pair):
     """In one step or in many.
 

@@ -517,27 +517,27 @@ JL_INLINE void jl_degrade_by_stress(const jlaw_law *law, jl_states n, jl_joint_s
                       work = k.degrades ? jl_load_joint(n, row + 1) : jl_broadcast_joint(0.0);
   jl_joint_real stress, rate;
   jl_stress_search search[JL_JOINTS_PER_PASS];
-  int searches = 0;
-  jl_contact_stress(law, n, m, 1.0 - lost, k, &stress, &rate);
-  for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
-    jl_stress_search *at = search + l;
-    at->exceeds = at->searches = JL_JOINT(stress, l) > JL_JOINT(peak, l);
-    at->u = at->high = 1.0 / (1.0 + JL_JOINT(peak, l) / S);
-    at->low = 0.0;
-    at->weight = at->exceeds ? jl_stress_weight(law, JL_JOINT(work, l)) : 0.0;
-    searches = searches || at->searches;
-  }
-  for (int i = 0; i < JLAW_MAX_FACTOR_ITERATIONS && searches; i++) {
-    searches = 0;
+  for (int i = 0;; i++) { /* one place of the call, because compilers inline every one */
+    jl_contact_stress(law, n, m, 1.0 - lost, k, &stress, &rate);
+    int searches = 0;
+    for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
+      jl_stress_search *at = search + l;
+      if (i == 0) {
+        at->exceeds = at->searches = JL_JOINT(stress, l) > JL_JOINT(peak, l);
+        at->u = at->high = 1.0 / (1.0 + JL_JOINT(peak, l) / S);
+        at->low = 0.0;
+        at->weight = at->exceeds ? jl_stress_weight(law, JL_JOINT(work, l)) : 0.0;
+      }
+      searches = searches || at->searches;
+    }
+    if (!searches || i == JLAW_MAX_FACTOR_ITERATIONS) break;
     for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
       jl_stress_search *at = search + l;
       if (!at->exceeds) continue;
       jl_search_stress_factor(S, JL_JOINT(stress, l), JL_JOINT(rate, l), at);
       const double loss = 1.0 - law->slope_residual - at->weight * at->u;
       JL_JOINT(lost, l) = loss > JL_JOINT(lost1, l) ? loss : JL_JOINT(lost1, l);
-      searches = searches || at->searches;
     }
-    jl_contact_stress(law, n, m, 1.0 - lost, k, &stress, &rate);
   }
   for (int l = 0; l < JL_JOINTS_PER_PASS; l++) {
     const jl_stress_search *at = search + l;

@@ -225,8 +225,8 @@ def small_load_errors(law):
     stress = law.normal_stress(ends).tolist()
     variants = {
         "`balanced`": replace(law, resolution="balanced"),
-        "`at_tolerance(0.01)`": law.at_tolerance(0.01),
-        "`at_tolerance(0.01, stress=...)`": law.at_tolerance(0.01, stress),
+        "`at_tolerance(0.02)`": law.at_tolerance(0.02),
+        "`at_tolerance(0.02, stress=...)`": law.at_tolerance(0.02, stress),
     }
     results = {name: [variant.tables.sliders] for name, variant in variants.items()}
     for path_range in PATH_RANGES:

@@ -79,8 +79,6 @@ PRIORS: dict[str, tuple[float, float]] = {
     "mu": (0.2, 1.0),
     # 2.5 to 6 in the paper; mean inclinations from 45 down to 6 degrees
     "a": (1.3, 9.0),
-    # Five decades about the strength of joint walls, 10 to 200 MPa: not informative
-    "degradation_stress": (1e5, 1e10),
     "b": (-1.0, 2.0),  # all of Eq. 18
     "c": (-1 / 3, 1 / 3),  # all of Eq. 18
 }

@@ -27,6 +27,7 @@ from .tables import Quantity, read_tables
 
 WATER_VISCOSITY = 1.002e-3  # Pa s, at 20 degrees Celsius
 MIN_POINTS = 3  # of the loading branch that are fitted
+_MIN_APERTURE = 1e-100  # m: bound of the trial values of a fit, whose logarithm is taken
 HYDRAULIC_APERTURE = Quantity(
     "hydraulic aperture (or the pressure at the inlet)",
     "m",
@@ -204,7 +205,8 @@ def fit_aperture(closure: Array, hydraulic: Array) -> Aperture:
 
     def residuals(x: Array) -> Array:
         e = Aperture(math.exp(x[0]), at, math.exp(x[1]))(closure).hydraulic
-        return np.asarray(np.log(e / hydraulic))
+        # far from the solution an aperture may underflow
+        return np.asarray(np.log(np.maximum(e, _MIN_APERTURE) / hydraulic))
 
     solution = least_squares(residuals, [start, -math.log(-slope)], xtol=1e-12, ftol=1e-12)
     return Aperture(math.exp(solution.x[0]), at, math.exp(solution.x[1]))

@@ -126,7 +126,7 @@ def test_two_slabs_under_a_divided_roof(law):
         until(sim, end)
         names = np.array([block.name.split()[0] for block in sim.scene.blocks])
         contacts = sim.contacts
-        pairs = names[contacts.block_a] + names[contacts.block_b]
+        pairs = np.char.add(names[contacts.block_a], names[contacts.block_b])
         force = contacts.area * sim.joints.traction[:, 0]
         return sim, [force[pairs == pair].sum() for pair in ("floorslab", "slabroof")]
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import ndimage
+from scipy.integrate import trapezoid
 
 import jointlaw as jl
 from jointlaw.surface.faces import MIRRORS, join_faces
@@ -251,7 +252,7 @@ def test_picture_of_a_scan(surface, tmp_path):
     assert law[0] == pytest.approx(np.degrees(np.arctan(rms_slope(fit.orientation))))
     (density,) = depths.lines
     x, y = density.get_xydata().T
-    assert 0.9 < np.trapezoid(y, x) <= 1.0
+    assert 0.9 < trapezoid(y, x) <= 1.0
     path = tmp_path / "scan.png"
     fit.plot(path)
     assert path.read_bytes().startswith(b"\x89PNG")

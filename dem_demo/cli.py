@@ -218,11 +218,13 @@ def _describe_in_space(statics: Statics, result: Equilibrium) -> None:
     scene = statics.scene
     contacts = f"{space_output.count_contacts(statics)} contacts of faces"
     points = f"{len(statics.points.area)} contact points"
-    print(f"{scene.title}: {int(statics.is_free.sum())} free blocks, {contacts}, {points}")
+    count = int(statics.is_free.sum())
+    blocks = "1 free block" if count == 1 else f"{count} free blocks"
+    print(f"{scene.title}: {blocks}, {contacts}, {points}")
     _print_rocks(scene)
     if statics.untouched.any():
-        blocks = format_blocks(list_blocks(scene, statics.untouched))
-        print(f"no contact of faces, which alone support a block in space: {blocks}")
+        untouched = format_blocks(list_blocks(scene, statics.untouched))
+        print(f"without a contact of faces, so that nothing supports them: {untouched}")
     print(f"initial state: {result.verdict.value}")
     _print_unstable(scene, result.verdict.value, result.unstable)
 
@@ -278,7 +280,7 @@ def _describe(sim: Simulation, until: float | None = None, with_pictures: bool =
 
 
 def _print_rocks(scene: Scene | SpaceScene) -> None:
-    """Print the numbers of blocks of each rock, and what was done with its slivers."""
+    """Print the numbers of blocks of each rock, and the merged and dropped slivers."""
     for rock in scene.rocks:
         fixed = len(rock.blocks) - len(rock.free)
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, {fixed} fixed")
@@ -409,15 +411,15 @@ def _check_stages(scene: Scene) -> None:
 
 
 def _warn_of_drawn_overlaps(scene: Scene) -> None:
-    """Name blocks that are drawn in each other, a fault of the drawing that closes their joints."""
-    found = drawn_overlaps(scene)
-    for first, second, depth in found[:MAX_LISTED_BLOCKS]:
+    """Print the pairs of blocks that overlap as drawn, which closes their joints."""
+    overlaps = drawn_overlaps(scene)
+    for first, second, depth in overlaps[:MAX_LISTED_BLOCKS]:
         print(
             f"drawing fault: blocks {first!r} and {second!r} overlap by {depth:.2g} m as drawn, "
             "which closes their joint by as much; draw them apart"
         )
-    if len(found) > MAX_LISTED_BLOCKS:
-        print(f"drawing fault: {len(found) - MAX_LISTED_BLOCKS} more pairs of blocks overlap")
+    if len(overlaps) > MAX_LISTED_BLOCKS:
+        print(f"drawing fault: {len(overlaps) - MAX_LISTED_BLOCKS} more pairs of blocks overlap")
 
 
 def _warn_of_floating_blocks(sim: Simulation) -> None:

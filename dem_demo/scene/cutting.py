@@ -67,14 +67,25 @@ class JointSet:
         """
         low, high = np.quantile(corners @ self.normal, [0.0, 1.0])
         start = float(np.dot(self.normal, self.through))
-        sides = []
-        for sign, end in ((1.0, high), (-1.0, low)):
-            length = max(sign * (end - start), 0)
-            count = int(np.ceil(length / (1 - self.scatter) / self.spacing))
-            steps = self.spacing * (1 + self.scatter * rng.uniform(-1, 1, count + 1))
-            sides.append(start + sign * np.cumsum(steps))
-        offsets = np.sort(np.concatenate([[start], *sides]))
-        return offsets[(offsets > low) & (offsets < high)]
+        return joint_offsets(low, high, start, self.spacing, self.scatter, rng)
+
+
+def joint_offsets(
+    low: float, high: float, start: float, spacing: float, scatter: float, rng: np.random.Generator
+) -> np.ndarray:
+    """Positions (m), ascending, of the joints of a set strictly between `low` and `high`.
+
+    The joint at `start` is one of them; from it on, each distance is spacing (1 + scatter r), with
+    r uniformly distributed over -1..1.
+    """
+    sides = []
+    for sign, end in ((1.0, high), (-1.0, low)):
+        length = max(sign * (end - start), 0.0)
+        count = int(np.ceil(length / (1 - scatter) / spacing))
+        steps = spacing * (1 + scatter * rng.uniform(-1, 1, count + 1))
+        sides.append(start + sign * np.cumsum(steps))
+    offsets = np.sort(np.concatenate([[start], *sides]))
+    return offsets[(offsets > low) & (offsets < high)]
 
 
 class Pieces(NamedTuple):

@@ -18,6 +18,7 @@ import numpy as np
 
 from jointlaw.support.progress import track
 
+from ..scene.cutting import joint_offsets
 from .solids import LENGTH_TOLERANCE, OUTLINE, Solid, convex_hull
 
 MERGE_TOLERANCE = 1e-6  # of the volume that a convex hull may add to two merged pieces
@@ -59,14 +60,7 @@ class PlaneSet:
         heights = vertices @ self.normal
         low, high = float(heights.min()), float(heights.max())
         start = float(np.dot(self.normal, self.through))
-        sides = []
-        for sign, end in ((1.0, high), (-1.0, low)):
-            length = max(sign * (end - start), 0.0)
-            count = int(np.ceil(length / (1 - self.scatter) / self.spacing))
-            steps = self.spacing * (1 + self.scatter * rng.uniform(-1, 1, count + 1))
-            sides.append(start + sign * np.cumsum(steps))
-        offsets = np.sort(np.concatenate([[start], *sides]))
-        return offsets[(offsets > low) & (offsets < high)]
+        return joint_offsets(low, high, start, self.spacing, self.scatter, rng)
 
 
 def plane_normal(dip: float, dip_direction: float) -> np.ndarray:

@@ -60,10 +60,10 @@ def _run(options: argparse.Namespace) -> None:
         },
         "sampling_length_m": fit.asperities.size,
         "not_identifiable": fit.not_identifiable,
-        "warnings": list(_warnings(fit)),
     }
     inputs = [options.file, *([options.upper] if options.upper else [])]
     about = new_about(options, inputs, _warnings(fit), _origin(fit))
+    summary["warnings"] = about.warnings
     files: Contents = {
         "surface.toml": f"{_surface_toml(fit, name)}\n{about.to_toml()}",
         "report.md": text,

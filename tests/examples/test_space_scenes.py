@@ -133,5 +133,5 @@ def test_check_lists_blocks_that_stand_on_an_edge(tmp_path, capsys):
     (tmp_path / "prism.toml").write_text(text + block("prism", corners=edge + top))
     assert main(["check", str(tmp_path / "prism.toml")]) == 0
     printed = capsys.readouterr().out
-    assert "no contact of faces, which alone support a block in space: prism (0.00, 0.00" in printed
+    assert "without a contact of faces, so that nothing supports them: prism (0.00, 0.00" in printed
     assert "1 block has no static equilibrium: prism" in printed

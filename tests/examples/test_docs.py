@@ -21,6 +21,7 @@ from scipy.ndimage import gaussian_filter
 import dem_demo.cli
 import jointlaw as jl
 from dem_demo.scene import Run
+from jointlaw.calibration.priors import PRIORS
 from jointlaw.cli.main import COMMANDS
 from jointlaw.cli.main import main as jointlaw_main
 
@@ -295,3 +296,9 @@ def test_troubleshooting_quotes_messages_as_the_code_has_them():
     assert len(quoted) > 20
     sources = "\n".join(messages())
     assert [quote for quote in sorted(quoted) if quote not in sources] == []
+
+
+def test_the_table_of_priors_has_every_prior():
+    table = text("docs/fits.md").split("| prior | range |")[1].split("\n\n")[0]
+    first_cells = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    assert set(re.findall(r"`(\w+)`", "".join(first_cells))) == set(PRIORS)

@@ -6,6 +6,13 @@ A first run records which test runs which line; the record is reused for the sam
 fault is run against the tests of its line; of its file if the line runs at import; of all joints or
 blocks if it is in C. Everything runs in copies of the index of git, staged changes included, under
 the temporary folder. Not part of CI. Needs `pip install pytest-cov`.
+
+    python tests/mutants.py --outputs --count 80 --seed 42
+
+inserts faults into what a user reads (`tests/output_faults.py`), as many of each kind. Each is run
+against the tests that are likely to detect it; then all that no test has detected are inserted at
+once and all tests are run, and the tests that fail are run against each fault alone. So every fault
+meets every test, unless two faults cancel each other.
 """
 
 import argparse
@@ -24,6 +31,8 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+from output_faults import all_faults
 
 ROOT = Path(__file__).parents[1]
 WORK_FOLDER = Path(tempfile.gettempdir()) / f"mutants-{hashlib.sha256(bytes(ROOT)).hexdigest()[:8]}"
@@ -51,6 +60,27 @@ OPPOSITE_OPERATORS = {
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
     ast.In: ast.NotIn, ast.NotIn: ast.In,
 }  # fmt: skip
+
+
+LIKELY_TESTS = {  # of faults of outputs: by kind and first folder
+    (
+        "columns",
+        "jointlaw",
+    ): "unit/test_laboratory.py unit/test_commands.py unit/test_options_felt.py",
+    ("columns", "dem_demo"): (
+        "verification/test_scene_by_hand.py verification/test_space_by_hand.py "
+        "examples/test_space_scenes.py unit/test_options_felt.py"
+    ),
+    ("keys", "jointlaw"): "unit/test_parameters.py unit/test_seams.py unit/test_options_felt.py",
+    ("keys", "dem_demo"): "verification/test_keys_felt.py unit/test_options_felt.py",
+    ("units", "jointlaw"): "unit/test_units.py unit/test_laboratory.py unit/test_pictures.py",
+    ("units", "dem_demo"): "verification/test_scene_by_hand.py unit/test_units.py",
+    ("pictures", "jointlaw"): "unit/test_pictures.py",
+    ("pictures", "dem_demo"): "unit/test_pictures.py",
+    ("state", "jointlaw"): "unit/test_joints.py verification/test_saved_state_whole.py",
+    ("state", "dem_demo"): "verification/test_saved_state_whole.py",
+}
+TESTS_OF_PAGES = "examples/test_docs.py examples/test_numbers.py examples/test_make_all.py"
 
 
 def with_fields(node, **fields):
@@ -208,12 +238,16 @@ def tests_of_lines(marks):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("where", nargs="+", help="files and folders of the repository")
+    parser.add_argument("where", nargs="*", help="files and folders of the repository")
+    parser.add_argument("--outputs", action="store_true", help="faults in what a user reads")
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--limit", type=float, default=300.0, help="s for the tests of one fault")
     parser.add_argument("--slow", action="store_true", help="the slow tests too")
     options = parser.parse_args()
+    if options.outputs:
+        try_faults_of_outputs(options)
+        return
     lines = tests_of_lines("" if options.slow else "not slow")
     copies = [Copy(f"copy-{i}") for i in range(2)]
     faults = faults_by_line(copies[0].root, options.where)
@@ -239,6 +273,78 @@ def main():
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(try_all, copies, (drawn[::2], drawn[1::2])))
     print(f"{len(faults)} lines; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
+
+
+def try_faults_of_outputs(options):
+    """Insert faults of each kind of `tests/output_faults.py`, and print the fate of each."""
+    rng = random.Random(options.seed)
+    by_kind = all_faults()
+    shares = itertools.cycle(sorted(by_kind))
+    counts = collections.Counter(next(shares) for _ in range(options.count))
+    faults = [one for kind in sorted(by_kind) for one in rng.sample(by_kind[kind], counts[kind])]
+    copy = Copy("outputs")
+    marks = "" if options.slow else "not slow"
+    detected_by = {}
+    for fault in faults:
+        likely = LIKELY_TESTS.get((fault.kind, Path(fault.file).parts[0]), TESTS_OF_PAGES).split()
+        paths = [f"tests/{name}" for name in likely if (copy.root / "tests" / name).exists()]
+        failed = failing_tests(copy, [fault], ["-x", "-m", "not slow", *paths], options.limit)
+        if failed:
+            detected_by[fault] = failed[0]
+        print(fault.kind, f"{fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
+              detected_by.get(fault, "not by the likely tests"), flush=True)  # fmt: skip
+    without_fault = {*failing_tests(copy, [], ["-m", marks], None)}
+    while group := compatible([one for one in faults if one not in detected_by]):
+        print(f"{len(group)} faults at once", flush=True)
+        failed = failing_tests(copy, group, ["-m", marks], None)
+        failed = [test for test in failed if test not in without_fault]
+        for fault in group:
+            by = failed and failing_tests(
+                copy, [fault], ["-x", "-m", marks, *failed], options.limit
+            )
+            detected_by[fault] = by[0] if by else ""
+            print(f"{fault.kind} {fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
+                  detected_by[fault] or "SURVIVED", flush=True)  # fmt: skip
+    for kind in sorted(by_kind):
+        own = [fault for fault in faults if fault.kind == kind]
+        seen = sum(bool(detected_by[fault]) for fault in own)
+        print(f"{kind:10} {seen} of {len(own)} detected; {len(by_kind[kind])} possible")
+    print(f"all        {sum(map(bool, detected_by.values()))} of {len(faults)}")
+
+
+def compatible(faults):
+    """Faults that can be inserted together: no two change the same text, but lines may be added
+    at the same place."""
+    chosen = []
+    for fault in faults:
+        span = (fault.start, fault.end)
+        if all(
+            fault.file != other.file
+            or fault.start > other.end
+            or other.start > fault.end
+            or span == (other.start, other.end) == (fault.start, fault.start)
+            for other in chosen
+        ):
+            chosen.append(fault)
+    return chosen
+
+
+def failing_tests(copy, faults, arguments, limit):
+    """Tests that fail with these faults, in the order of their report."""
+    originals = {fault.file: (copy.root / fault.file).read_bytes() for fault in faults}
+    try:
+        for fault in sorted(faults, key=lambda one: one.start, reverse=True):
+            path = copy.root / fault.file
+            text = path.read_bytes()
+            path.write_bytes(text[: fault.start] + fault.new.encode() + text[fault.end :])
+        status, output = copy.run_pytest("-n0", *arguments, limit=limit)
+    except subprocess.TimeoutExpired:
+        return ["too long"]
+    finally:
+        for name, text in originals.items():
+            (copy.root / name).write_bytes(text)
+    failed = re.findall(r"^(?:FAILED|ERROR) (tests/.*?)(?: - |$)", output, re.MULTILINE)
+    return failed or (["pytest"] if status else [])
 
 
 def faults_by_line(root, places):

@@ -2,8 +2,10 @@
 
 A part is one command, which writes a table into a page, between the marks of the same name, or
 pictures into docs/pictures, or an ablation of a shipped scene into docs/data. All other output of
-the command is printed: it has the figures that a page quotes. `--list` prints all parts: name,
-pages or files, command. `timed` names all parts that measure times, the tables of costs.
+the command is printed: it has the figures that a page quotes. It is stored in docs/data/printed,
+too, below the command and its time: tests compare the pages with these files. `--list` prints all
+parts: name, pages or files, command. `timed` names all parts that measure times, the tables of
+costs.
 
 Without a name all parts are made. Parts that measure no time run two at a time, on one thread each;
 parts that measure times come last, one by one: let no other program run meanwhile. Some parts need
@@ -23,6 +25,7 @@ from pathlib import Path
 from threading import Lock
 
 DOCS = Path(__file__).parent
+PRINTED = DOCS / "data" / "printed"
 PAGE_LOCK = Lock()  # two parts may write to the same page
 
 
@@ -175,12 +178,17 @@ PARTS = {
 def make(name):
     """Run the command of a part and store its output; returns the text that it printed."""
     part = PARTS[name]
+    start = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        printed = run(part, folder)
+        printed = run(part, folder).replace(folder, "FOLDER")
         for picture, file in part.pictures.items():
             shutil.copy(Path(folder) / file, DOCS / "pictures" / picture)
     if part.page:
         write_table(part.page, name, first_table(printed))
+    PRINTED.mkdir(exist_ok=True)
+    took = f"{time.perf_counter() - start:.0f} s"
+    text = "\n".join([f"python {part.command}  # {took}", printed.rstrip()]) + "\n"
+    (PRINTED / f"{name}.txt").write_text(text, encoding="utf-8")
     return printed
 
 

@@ -33,8 +33,10 @@ ARTISTS = {
     "PolyCollection", "Polygon", "Line2D",
 }  # fmt: skip
 UNIT_IN_LABEL = re.compile(r"\((mm|µm|um|m|kPa|MPa|Pa|°|%|degrees|s|J/m²|m/s)\)")
-OTHER_UNIT = {"mm": "m", "µm": "mm", "um": "mm", "m": "mm", "kPa": "MPa", "MPa": "kPa", "Pa": "kPa",
-              "°": "rad", "%": "1", "degrees": "rad", "s": "ms", "J/m²": "kJ/m²", "m/s": "mm/s"}  # fmt: skip
+OTHER_UNIT = {
+    "mm": "m", "µm": "mm", "um": "mm", "m": "mm", "kPa": "MPa", "MPa": "kPa", "Pa": "kPa",
+    "°": "rad", "%": "1", "degrees": "rad", "s": "ms", "J/m²": "kJ/m²", "m/s": "mm/s",
+}  # fmt: skip
 # Commands by which a page says where its numbers come from
 COMMAND_ON_PAGE = re.compile(r"docs/make_all\.py|pytest |python -m |`jointlaw \w+ ")
 NUMBER = re.compile(r"(?<![\w.^/\[-])\d+(?:\.\d+)?(?=(?:e-?\d+)?(?![\w.]*\w))")
@@ -319,8 +321,7 @@ def pages():
 def printed_parts(text):
     """Spans (start, end) of a page whose numbers a command prints.
 
-    Tables between marks, paragraphs and tables that name a command (or whose paragraph before it
-    does), and comments and printed lines of code.
+    Tables between marks, and paragraphs and tables that name a command, or follow one that does.
     """
     for match in re.finditer(r"<!-- ([\w-]+) -->\n(.*?)<!-- end of \1 -->", text, re.DOTALL):
         yield match.span(2)

@@ -39,6 +39,7 @@ FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "place_solids": ([], None),
     "near_pairs": ([POINTER] * 2 + [INTEGER, POINTER], INTEGER),
     "separations": ([INTEGER, POINTER, DOUBLE, POINTER], None),
+    "update_face_points": ([], INTEGER),
     "face_contacts": ([INTEGER, *[POINTER] * 4, DOUBLE, POINTER], INTEGER),
 }
 
@@ -101,6 +102,12 @@ class PointArrays(Arrays):
     """`dem_points` of layout.h: contact points of polyhedra."""
 
     _fields_ = [(name, field.ctype) for name, field in layout.POINTS.items()]
+
+
+class FacePointArrays(Arrays):
+    """`dem_face_points` of layout.h: contact points of polyhedra while the blocks move."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.FACE_POINTS.items()]
 
 
 class BoltArrays(Arrays):

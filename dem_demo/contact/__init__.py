@@ -8,11 +8,10 @@ joints         a pool of joints for each law, and its first-loading curve
 
 from .geometry import Contacts, Outlines
 from .joints import STATE_PARTS, Joints, tabulate_first_loading
-from .manager import MAX_SKIN_UNTIL_REBUILD, ContactManager
+from .manager import ContactManager
 from .rows import ContactRows
 
 __all__ = [
-    "MAX_SKIN_UNTIL_REBUILD",
     "STATE_PARTS",
     "ContactManager",
     "ContactRows",

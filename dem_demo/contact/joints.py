@@ -9,7 +9,7 @@ tractions and measures from there: arrays of a law run over the places of its po
 `Joints` over the contacts.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -185,6 +185,17 @@ def stick_response(
     return F, C
 
 
+def _repetitions(old_row: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the contacts whose row before, `old_row` (k,), another contact has too: all second
+    ones, then all third ones and so on, so that no row comes twice in one group."""
+    order = np.argsort(old_row, kind="stable")
+    order = order[old_row[order] >= 0]
+    rows = old_row[order]
+    number = np.arange(len(rows)) - np.searchsorted(rows, rows)  # of a contact with its row
+    for repetition in range(1, int(number.max(initial=0)) + 1):
+        yield np.sort(order[number == repetition])
+
+
 class Joints:
     """All joints of a scene; arrays run over the k contacts.
 
@@ -200,7 +211,7 @@ class Joints:
 
     Faces that meet in a run are unmated if the law has a finite mating length. first_touch
     (k, dim): displacement of the law (closure and sliding, m) at which such a joint first touches,
-    zero for a mated one. edge_pairs (k, 2): the two edges whose faces meet.
+    zero for a mated one. face_pairs (k, 2): the two faces that meet, edges in the plane.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -210,7 +221,7 @@ class Joints:
         self.reduction = np.array([1.0, *[scene.reduction] * (self.dim - 1)])
         self.tensile_stiffness = np.array([law.tensile_stiffness for law in scene.laws.values()])
         self.first_touch = np.zeros((0, self.dim))
-        self.edge_pairs = np.zeros((0, 2), int)
+        self.face_pairs = np.zeros((0, 2), int)
         self._arrange(np.zeros(0, int), np.zeros(0, int))
 
     def _arrange(self, law: np.ndarray, place: np.ndarray) -> None:
@@ -244,14 +255,15 @@ class Joints:
         )  # fmt: skip
 
     def rearrange(
-        self, old_row: np.ndarray, law: np.ndarray, edge_pairs: np.ndarray, started: bool = False
+        self, old_row: np.ndarray, law: np.ndarray, face_pairs: np.ndarray, started: bool = False
     ) -> None:
         """Follow a new list of contacts.
 
         old_row (k,): row of each contact in the list before, -1 for a new one; law (k,);
-        edge_pairs (k, 2); started: whether the run has started. Before the start, new joints are
+        face_pairs (k, 2); started: whether the run has started. Before the start, new joints are
         mated and bonded. In a run they have no bond, and are mated only where the same two faces
-        still touch in another mated joint, which they continue.
+        still touch in another mated joint, which they continue. Of several contacts with one row
+        before, the first keeps the joint and the others get copies of it.
         """
         is_new = old_row < 0
         new_rows = np.flatnonzero(is_new)
@@ -259,8 +271,8 @@ class Joints:
         place = np.append(self.place, -1)[old_row]
         first_touch = np.vstack([self.first_touch, np.zeros(self.dim)])[old_row]
         pair_as_number = [1, 1j]
-        mated_pairs = self.edge_pairs[~self.first_touch.any(axis=1)] @ pair_as_number
-        continues = np.isin(edge_pairs[new_rows] @ pair_as_number, mated_pairs) | (not started)
+        mated_pairs = self.face_pairs[~self.first_touch.any(axis=1)] @ pair_as_number
+        continues = np.isin(face_pairs[new_rows] @ pair_as_number, mated_pairs) | (not started)
         for i, joints in enumerate(self.by_law):
             joints.release(self.place[has_ended & (self.law == i)])
             is_mated = continues | (not joints.law.tables.interlock_decays)
@@ -269,8 +281,15 @@ class Joints:
                 if len(rows):
                     place[rows] = joints.allocate(len(rows))
                     first_touch[rows] = joints.initialise(place[rows], mated, bonded=not started)
+        for repeats in _repetitions(old_row):
+            for i, joints in enumerate(self.by_law):
+                rows = repeats[law[repeats] == i]
+                if len(rows):
+                    sources = place[rows]
+                    place[rows] = joints.allocate(len(rows))
+                    joints.copy(sources, place[rows])
         self.first_touch = first_touch
-        self.edge_pairs = edge_pairs
+        self.face_pairs = face_pairs
         self._arrange(law, place)
 
     def update(self, closure: np.ndarray, shears: np.ndarray) -> None:
@@ -396,9 +415,9 @@ class Joints:
         return arrays
 
     def restore(
-        self, state: dict[str, np.ndarray], law: np.ndarray, edge_pairs: np.ndarray
+        self, state: dict[str, np.ndarray], law: np.ndarray, face_pairs: np.ndarray
     ) -> None:
-        """Return to a snapshot of contacts with these laws (k,) and edges (k, 2).
+        """Return to a snapshot of contacts with these laws (k,) and faces (k, 2).
 
         Raises ValueError for a snapshot of other contacts or laws.
         """
@@ -413,5 +432,5 @@ class Joints:
                 )
             place[rows] = joints.restore(jl.JointState(str(fingerprint), values.T))
         self.first_touch = first_touch.copy()
-        self.edge_pairs = edge_pairs
+        self.face_pairs = face_pairs
         self._arrange(law, place)

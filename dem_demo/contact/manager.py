@@ -74,18 +74,20 @@ def _in_range(contacts: Contacts, is_known: np.ndarray) -> np.ndarray:
 class ContactManager:
     """The contacts of a scene, k at present.
 
-    contacts: at the motion of the last update, on corner and edge (k,). edge_pairs (k, 2): edges
+    contacts: at the motion of the last update, on corner and edge (k,). face_pairs (k, 2): edges
     whose faces met when the contact was found. law (k,): number of the law between these.
     closure_offset (k,): depth at zero closure (m). Above zero it is a depth that the contact had to
     give up (`Simulation._transfer_joints`), until it opens; below zero it is minus the closure
     under in-situ stress, for good. rebuilt_at (3, blocks): motion at which the contacts of each
     block were last searched. needs_rebuild (blocks,): contacts must be searched wherever the block
-    is. skins (blocks,) in m: pymunk reports pairs within the sum of their skins; a contact begins
+    is. max_skin_until_rebuild: fraction of its skin that a block may move until a rebuild. skins
+    (blocks,) in m: pymunk reports pairs within the sum of their skins; a contact begins
     at a gap of their mean.
     """
 
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
         self.blocks = blocks = scene.blocks
+        self.max_skin_until_rebuild = MAX_SKIN_UNTIL_REBUILD
         self.skins = scene.skins
         self.outlines = Outlines(blocks, scene.run.corner_length, scene.run.soft, scene.thickness)
         self.max_overlap = scene.run.max_overlap * np.array([block.width for block in blocks])
@@ -93,7 +95,7 @@ class ContactManager:
         self.is_fixed = np.array([block.fixed for block in blocks])
         self._read_laws(scene)
         self.law = np.zeros(0, int)
-        self.edge_pairs = np.zeros((0, 2), int)
+        self.face_pairs = np.zeros((0, 2), int)
         self.closure_offset = np.zeros(0)
         self.needs_rebuild = np.zeros(len(blocks), bool)
         self.rebuilt_at = np.full((3, len(blocks)), np.nan)  # never
@@ -158,7 +160,7 @@ class ContactManager:
             return rows
         depth = np.maximum(detected.closure[is_new], 0.0)
         offset = 0.0 * depth if keep_closure else depth
-        self.edge_pairs = np.concatenate([self.edge_pairs[rows], edge_pairs[is_new]])
+        self.face_pairs = np.concatenate([self.face_pairs[rows], edge_pairs[is_new]])
         self.law = np.concatenate([self.law[rows], law[is_new]])
         self.closure_offset = np.concatenate([self.closure_offset[rows], offset])
         corner = np.concatenate([present.corner[rows], detected.corner[is_new]])

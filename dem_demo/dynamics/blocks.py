@@ -103,6 +103,10 @@ class Blocks:
         pairs = np.array(sorted(self._neighbours), int).reshape(-1, 2)
         return pairs[~self.is_removed[pairs].any(axis=1)]
 
+    def displace(self, motion: np.ndarray) -> None:
+        """Displace the blocks by their motions (n, 3), in m and rad."""
+        self.motion[:3] += motion.T
+
     def remove(self, rows: list[int]) -> None:
         """Remove blocks: they neither move nor touch other blocks any more."""
         self.is_removed[rows] = True

@@ -13,13 +13,15 @@ closure is not a displacement of the blocks, which are drawn in their places und
 contact manager keeps it as a negative closure offset.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..contact import ContactManager, ContactRows, Contacts, Joints
 from ..scene import Scene
 from .blocks import Blocks, apply_loads
 from .relaxation import Verdict
-from .search import EquilibriumSearch, StaticSystem
+from .search import EquilibriumSearch, StaticSystem, vector_length
 from .timestep import scaled_kinematics
 
 MAX_UNBALANCED_RATIO = 1e-3  # unbalanced force of a stable block, relative to its weight
@@ -37,16 +39,18 @@ MIN_SLOPE = 0.05  # of the shear stiffness of the unsheared joint
 
 
 def unbalanced_force_ratio(blocks: Blocks, force: np.ndarray) -> np.ndarray:
-    """Unbalanced forces (n, 3) relative to the weights of the blocks, (n,).
+    """Unbalanced forces (n, dof) relative to the weights of the blocks, (n,).
 
     Weights are on Earth in a scene without gravity, and at least a millionth of the largest load.
     Moments are divided by the radius of the block.
     """
     mass = blocks.inertia[:, 0]
+    dim = 2 if force.shape[1] == 3 else 3
     largest_load = np.abs(blocks.gravity + blocks.loads).max(initial=0.0)
-    acceleration = (np.hypot(*blocks.gravity[:, :2].T) / mass).max() or STANDARD_GRAVITY
-    x, y, moment = (force * blocks.is_free).T
-    size = np.sqrt(x**2 + y**2 + (moment / blocks.radius) ** 2)
+    acceleration = (vector_length(blocks.gravity[:, :dim]) / mass).max() or STANDARD_GRAVITY
+    free_force = force * blocks.is_free
+    free_force[:, dim:] /= blocks.radius[:, None]
+    size = np.sqrt((free_force**2).sum(axis=1))
     return size / np.maximum(mass * acceleration, MIN_FORCE_SCALE * largest_load)
 
 
@@ -69,12 +73,12 @@ def static_system(
 ) -> StaticSystem:
     """Blocks at their present places, on virgin joints but for their closure and sliding so far.
 
-    sliding (k,) in m. lengths_changed: the blocks have moved since the joints closed, so a change
-    of the lengths of joints costs stored energy (see `contact/geometry.py`).
+    sliding (k, dim - 1) in m. lengths_changed: the blocks have moved since the joints closed, so a
+    change of the lengths of joints costs stored energy (see `contact/geometry.py`).
     """
     contacts = manager.contacts
     force = blocks.gravity + blocks.loads
-    start = np.stack([manager.closure, sliding], axis=1)
+    start = np.column_stack([manager.closure, sliding])
     if lengths_changed:
         stored_energy = joints.trial(start - joints.delta)[2]
         length_forces = contacts.assemble_forces(len(force), 0.0 * start, stored_energy)
@@ -100,20 +104,21 @@ def create_joints(
 ) -> np.ndarray:
     """Find the contacts of blocks as drawn, and give them virgin joints.
 
-    Returns the sliding (k,) in m with which the joints start, and sets the closure offsets of the
+    Returns the sliding (k, 1) in m with which the joints start, and sets the closure offsets of the
     manager: closure and sliding under in-situ stress, zero without it.
     """
     old_row = manager.rebuild(blocks.motion, blocks.neighbour_pairs())
-    joints.rearrange(old_row, manager.law, manager.edge_pairs)
+    joints.rearrange(old_row, manager.law, manager.face_pairs)
     apply_loads(scene, blocks, manager)
     if scene.in_situ is None or not joints.n:
-        return np.zeros(joints.n)
+        return np.zeros((joints.n, 1))
     contacts = manager.contacts
     skin = scene.skins.min()
     stress = _in_situ_stress(scene, contacts)
     is_apart = contacts.closure < -MAX_DRAWN_GAP * skin
     stress[is_apart | (contacts.length < MIN_LENGTH) | (stress[:, 0] <= 0)] = 0.0
-    closure, sliding = _displacement_at_stress(joints, stress).T
+    closure, sliding = np.hsplit(_displacement_at_stress(joints, stress), [1])
+    closure = closure[:, 0]
     if closure.max() > skin:
         raise ValueError(
             f"in_situ closes joints by up to {closure.max():.3g} m, but contacts are followed to "
@@ -174,14 +179,21 @@ def _displacement_at_stress(joints: Joints, stress: np.ndarray) -> np.ndarray:
 
 
 def settle(
-    scene: Scene, blocks: Blocks, manager: ContactManager, joints: Joints, sliding: np.ndarray
+    scene: Scene,
+    blocks: Blocks,
+    manager: ContactManager,
+    joints: Joints,
+    sliding: np.ndarray,
+    apply_loads: Callable = apply_loads,
 ) -> tuple[np.ndarray, Verdict]:
-    """Move the blocks to their static equilibrium.
+    """Move the blocks to their static equilibrium, in the plane or in space.
 
-    sliding (k,) in m: with which the joints start at the places as drawn. Returns the sliding with
-    which they start at equilibrium, and the verdict. Unstable blocks stay almost where they
-    are drawn; the others are in equilibrium with the forces that the unstable ones exert on them
-    there.
+    sliding (k, dim - 1) in m: with which the joints start at the places as drawn. apply_loads: of
+    the scene, blocks and manager; sets the loads of the blocks at their present places.
+
+    Returns the sliding with which the joints start at equilibrium, and the verdict. Unstable blocks
+    stay almost where they are drawn; the others are in equilibrium with the forces that the
+    unstable ones exert on them there.
     """
     verdict = Verdict.EQUILIBRIUM
     unstable = np.zeros(len(blocks.is_free), bool)
@@ -191,8 +203,8 @@ def settle(
         manager.update(blocks.motion)
         manager.needs_rebuild[:] = True  # cheap here, and no contact is missed
         old_row = manager.rebuild(blocks.motion, pairs)
-        joints.rearrange(old_row, manager.law, manager.edge_pairs)
-        sliding = np.append(sliding, 0.0)[old_row]
+        joints.rearrange(old_row, manager.law, manager.face_pairs)
+        sliding = np.vstack([sliding, np.zeros(sliding.shape[1])])[old_row]
         apply_loads(scene, blocks, manager)
         system = static_system(scene, blocks, manager, joints, sliding, n_round > 0)
         search = EquilibriumSearch(system)
@@ -203,14 +215,15 @@ def settle(
             verdict = Verdict.NOT_DECIDED
         elif verdict is Verdict.EQUILIBRIUM and unstable.any():
             verdict = Verdict.NO_EQUILIBRIUM
-        sliding = sliding + (search.kinematics @ displacement)[len(sliding) :]
-        blocks.motion[:3] += search.expand(displacement * search.root).T
+        shears = (search.kinematics @ displacement)[len(sliding) :]
+        sliding = sliding + shears.reshape(-1, len(sliding)).T
+        blocks.displace(search.expand(displacement * search.root))
         is_stable = ~unstable[search.block]
         largest = np.abs(displacement[is_stable]).max(initial=0.0)
         first_displacement = first_displacement or largest
         if n_round and largest <= SETTLED_RATIO * first_displacement:
             break
-    manager.rebuilt_at[:] = blocks.motion[:3]
+    manager.rebuilt_at[:] = blocks.motion[: len(manager.rebuilt_at)]
     return sliding, verdict
 
 

@@ -101,7 +101,7 @@ def free_motion_matrix(
     return matrix[:, is_free.ravel()]
 
 
-def _size(columns: np.ndarray) -> np.ndarray:
+def vector_length(columns: np.ndarray) -> np.ndarray:
     """Lengths (n,) of vectors (n, dim)."""
     return reduce(np.hypot, np.abs(columns).T)
 
@@ -147,7 +147,7 @@ class EquilibriumSearch:
         self.start = system.start.T.ravel()
         self.root = system.scale[system.is_free]
         self.block = np.nonzero(system.is_free)[0]  # of each free motion
-        acceleration = _size(system.force[:, : self.dim]) / system.mass / system.radius
+        acceleration = vector_length(system.force[:, : self.dim]) / system.mass / system.radius
         # drag at which the load moves a block by its radius in a step
         self.drag_of_radius = float(np.median(acceleration[system.is_free.any(axis=1)]))
         self.force = system.force[system.is_free] * self.root
@@ -235,8 +235,8 @@ class EquilibriumSearch:
     def _distance(self, displacement: np.ndarray) -> np.ndarray:
         """Largest displacement (n,) in m of each block at scaled displacements (n, dof)."""
         motion = displacement * self.system.scale
-        rotation = _size(motion[:, self.dim :])
-        return _size(motion[:, : self.dim]) + rotation * self.system.radius
+        rotation = vector_length(motion[:, self.dim :])
+        return vector_length(motion[:, : self.dim]) + rotation * self.system.radius
 
     def _is_moving(self, growth: np.ndarray) -> np.ndarray:
         """Mask (n,) of blocks whose displacement in `growth` is more than a fraction of the largest

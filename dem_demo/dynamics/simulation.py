@@ -18,6 +18,7 @@ import io
 import json
 from operator import attrgetter
 from pathlib import Path
+from typing import Any, ClassVar
 from zipfile import BadZipFile
 
 import numpy as np
@@ -25,12 +26,13 @@ import numpy as np
 from jointlaw.support.files import write_files
 
 from ..compiled import StepArrays, function_address
-from ..contact import MAX_SKIN_UNTIL_REBUILD, STATE_PARTS, ContactManager, Contacts, Joints
+from ..contact import STATE_PARTS, ContactManager, Contacts, Joints
 from ..scene import Files, Scene, SceneError, parse
 from .blocks import MAX_SKIN_PER_STEP, Blocks, apply_loads
 from .energy_balance import BOLTS, DISCARDED, EnergyBalance
 from .equilibrium import create_joints, find_unbalanced, settle
 from .relaxation import Verdict
+from .search import vector_length
 from .timestep import MAX_FRACTION_OF_LIMIT, TimeStepLimit, impact_limit
 
 WIDE_MARGIN = 0.4  # fraction of the limit: a step below it stays stable as lever arms change
@@ -49,7 +51,7 @@ FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
 IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
 MAX_HALVINGS = 8  # of a time step that was chosen automatically
 FILE = "state.npz"
-VERSION = 13
+VERSION = 14
 UPDATED_IN_PLACE = (  # arrays of the state that the compiled step, or views of them, refer to
     "blocks.motion",
     "blocks.velocity",
@@ -76,7 +78,7 @@ STATE = (
     "limit.lowest",
     "limit.lowest_bound",
     "limit.checked_stiffness",
-    "manager.edge_pairs",
+    "manager.face_pairs",
     "manager.law",
     "manager.closure_offset",
     "energy_balance.start",
@@ -104,7 +106,14 @@ class Simulation:
     Where neither `step` nor the scene sets the time step, it is halved when joints close too far
     for it, or blocks become too fast. Raises ValueError unless the step is a finite number > 0
     and for a state of another scene, SceneError for an initial state that the method cannot treat.
+
+    `space.SpaceSimulation` replaces what depends on the geometry: the parts, their state, how
+    contacts begin and end, and the loads.
     """
+
+    state_paths: ClassVar = STATE
+    updated_in_place: ClassVar = UPDATED_IN_PLACE
+    parse: ClassVar = staticmethod(parse)
 
     def __init__(
         self, scene: Scene, step: float | None = None, saved: SavedState | None = None
@@ -112,10 +121,7 @@ class Simulation:
         if step is not None and not 0 < step < np.inf:
             raise ValueError(f"step = {step} s: must be a finite number > 0")
         self.scene = scene
-        self.blocks = Blocks(scene)
-        self.manager = ContactManager(scene, self.blocks.motion)
-        self.joints = Joints(scene)
-        self.energy_balance = EnergyBalance(len(scene.blocks))
+        self._create_parts()
         self.limit = TimeStepLimit()
         self.time_of_last_change = 0.0  # of the time step (s)
         self.steps_since_change = 0
@@ -128,6 +134,18 @@ class Simulation:
             self._restore(saved, step)
         else:
             self._start(step)
+
+    def _create_parts(self) -> None:
+        """Create blocks, contact manager, joints and energy balance of the scene as drawn."""
+        scene = self.scene
+        self.blocks = Blocks(scene)
+        self.manager = ContactManager(scene, self.blocks.motion)
+        self.joints = Joints(scene)
+        self.energy_balance = EnergyBalance(len(scene.blocks))
+
+    def _apply_loads(self, *_: Any) -> np.ndarray:
+        """Update the loads of the blocks at their present places; returns their change (n, dof)."""
+        return apply_loads(self.scene, self.blocks, self.manager, self.water_time)
 
     @property
     def time(self) -> float:
@@ -236,14 +254,14 @@ class Simulation:
         """Reduce the support linearly, to zero at the end of the time left (s)."""
         remaining = max(time_left, 0.0) / max(time_left + self.dt, self.dt)
         self.blocks.support *= remaining
-        change = apply_loads(self.scene, self.blocks, self.manager, self.water_time)
-        self.energy_balance.change_loads(self.blocks, change, self.dt)
+        self.energy_balance.change_loads(self.blocks, self._apply_loads(), self.dt)
 
     def _is_at_rest(self) -> bool:
         """Whether no support is being released, and most blocks are slow and balanced."""
         blocks = self.blocks
-        speed = np.hypot(*blocks.velocity[:2])
-        force = np.hypot(*self.energy_balance.forces[0].T[:2])
+        dim = self.joints.dim
+        speed = vector_length(blocks.velocity[:dim].T)
+        force = vector_length(self.energy_balance.forces[0][:, :dim])
         acceleration = force / blocks.inertia[:, 0]
         motion = np.maximum(speed / RESTING_SPEED, acceleration / RESTING_ACCELERATION)
         is_resting = np.quantile(motion[blocks.is_mobile[:, 0]], RESTING_FRACTION) < 1
@@ -254,8 +272,7 @@ class Simulation:
         time = min(self.time, self.scene.water_changes[-1][0])
         if time > self.water_time:
             self.water_time = time
-            change = apply_loads(self.scene, self.blocks, self.manager, time)
-            self.energy_balance.change_loads(self.blocks, change, self.dt)
+            self.energy_balance.change_loads(self.blocks, self._apply_loads(), self.dt)
 
     # ------------------------------------------------------------------ the time step
 
@@ -301,8 +318,7 @@ class Simulation:
                 float(np.interp(IMPACT_STRESS, joints.curve["stress"], joints.curve["stiffness"]))
                 for joints in self.joints.by_law
             )
-            outlines = self.manager.outlines
-            limit = min(limit, impact_limit(scene, self.blocks, outlines, stiffness))
+            limit = min(limit, self._impact_limit(stiffness))
         if not np.isfinite(limit):
             raise SceneError("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
@@ -316,6 +332,10 @@ class Simulation:
             self.fraction_reason = driven if is_driven else resting
         return FRACTIONS_OF_LIMIT[self.fraction_reason] * limit
 
+    def _impact_limit(self, stiffness: float) -> float:
+        """Step limit (s) if every block were touched all around; stiffness (Pa/m): of joints."""
+        return impact_limit(self.scene, self.blocks, self.manager.outlines, stiffness)
+
     # ------------------------------------------------------------------ start
 
     def _start(self, step: float | None) -> None:
@@ -325,14 +345,14 @@ class Simulation:
         manager = self.manager
         joints = self.joints
         try:
-            sliding = create_joints(scene, blocks, manager, joints)
+            sliding = self._create_joints()
         except SceneError as error:
             raise SceneError(f"blocks are drawn in each other: {error}") from None
         verdict = Verdict.NO_EQUILIBRIUM  # of blocks that touch nothing
         if scene.run.settle and joints.n and blocks.is_free.any():
-            sliding, verdict = settle(scene, blocks, manager, joints, sliding)
+            sliding, verdict = settle(scene, blocks, manager, joints, sliding, self._apply_loads)
         manager.update(blocks.motion)
-        self.initial = blocks.motion.copy()
+        self._note_initial_places()
         joints.update(manager.closure, sliding)
         blocks.bolts.pull()
         self.unstable = find_unbalanced(blocks, self.contacts, joints)
@@ -346,7 +366,8 @@ class Simulation:
         self.limit.require_stable(self.dt)
         drives = blocks.drives
         drives.aim[:] = drives.velocity(0.0, self.dt)
-        blocks.motion[3:][drives.axes, drives.rows] = drives.aim
+        velocity = blocks.motion[len(blocks.velocity) :]
+        velocity[drives.axes, drives.rows] = drives.aim
         manager.update(blocks.motion)
         balance = self.energy_balance
         balance.booked_area = self.contacts.area.copy()
@@ -355,8 +376,17 @@ class Simulation:
         self.arrays.call("compute_forces", 0.5 * self.dt)
         balance.open(blocks, joints, self.dt)
         half_step = 0.5 * self.dt * balance.forces[0] / blocks.inertia
-        blocks.motion[3:] += (half_step * blocks.is_free).T
-        blocks.velocity[:] = blocks.motion[3:]
+        velocity += (half_step * blocks.is_free).T
+        blocks.velocity[:] = velocity
+
+    def _create_joints(self) -> np.ndarray:
+        """Find the contacts of the scene as drawn and give them virgin joints; returns the sliding
+        (k, dim - 1) in m with which they start."""
+        return create_joints(self.scene, self.blocks, self.manager, self.joints)
+
+    def _note_initial_places(self) -> None:
+        """Keep the places of the blocks at step 0."""
+        self.initial = self.blocks.motion.copy()
 
     def bind(self) -> None:
         """Bind all arrays to the compiled step, after each change of the list of contacts."""
@@ -366,14 +396,17 @@ class Simulation:
         manager = self.manager
         balance = self.energy_balance
         joints = self.joints
-        contacts = self.contacts
-        contacts.corner_arrays.bind(motion=blocks.motion, needs_rebuild=manager.needs_rebuild)
-        arrays = StepArrays(n_blocks=len(blocks.names), n_contacts=joints.n, dim=2, dof=3)
+        arrays = StepArrays(
+            n_blocks=len(blocks.names),
+            n_contacts=joints.n,
+            dim=joints.dim,
+            dof=len(blocks.velocity),
+        )
         arrays.law_steps = run.law_steps
         arrays.dashpot_normal = run.dashpot_normal
         arrays.dashpot_shear = run.dashpot_shear
         arrays.max_skin_per_step = MAX_SKIN_PER_STEP
-        arrays.max_skin_until_rebuild = MAX_SKIN_UNTIL_REBUILD
+        arrays.max_skin_until_rebuild = manager.max_skin_until_rebuild
         arrays.n_driven = len(drives.rows)
         arrays.bind(
             blocks, "motion", "velocity", "inertia", "gravity", "loads", "inverse_mass", "radius",
@@ -386,13 +419,20 @@ class Simulation:
         )
         arrays.bind(self.limit, "checked_stiffness")
         arrays.bind(
-            contacts, "block_a", "block_b", "closure", "area", "kinematics", "area_gradient",
-            "rates", geometry=contacts.corner_arrays,
+            self.contacts, "block_a", "block_b", "closure", "area", "kinematics", "area_gradient",
+            "rates",
         )  # fmt: skip
-        arrays.update_geometry = function_address("update_contacts")
+        self._bind_geometry(arrays)
         joints.bind(arrays)
         arrays.call("compute_rates")
         self.arrays = arrays
+
+    def _bind_geometry(self, arrays: StepArrays) -> None:
+        """Bind the geometry of the contacts, and the function that updates it."""
+        corner_arrays = self.contacts.corner_arrays
+        corner_arrays.bind(motion=self.blocks.motion, needs_rebuild=self.manager.needs_rebuild)
+        arrays.bind(geometry=corner_arrays)
+        arrays.update_geometry = function_address("update_contacts")
 
     # ------------------------------------------------------------------ contacts that change
 
@@ -425,11 +465,10 @@ class Simulation:
         balance.energy[DISCARDED] += stored_energy.sum()
         balance.booked_area = np.append(balance.booked_area, 0.0)[old_row]
         limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[old_row]
-        joints.rearrange(old_row, manager.law, manager.edge_pairs, started=True)
+        joints.rearrange(old_row, manager.law, manager.face_pairs, started=True)
         balance.booked_dissipation = joints.dissipated_energy.copy()
         self.bind()
-        change = apply_loads(self.scene, blocks, manager, self.water_time)
-        balance.change_loads(blocks, change, self.dt)
+        balance.change_loads(blocks, self._apply_loads(), self.dt)
         return old_row < 0
 
     def _continue_across_seams(self, is_new: np.ndarray) -> None:
@@ -441,7 +480,7 @@ class Simulation:
         manager = self.manager
         joints = self.joints
         edge_pairs = self.contacts.edge_pairs
-        has_other_edges = (edge_pairs != manager.edge_pairs).any(axis=1)
+        has_other_edges = (edge_pairs != manager.face_pairs).any(axis=1)
         stored_energy = joints.stored_energy
         is_idle = (stored_energy == 0) & (joints.traction == 0).all(axis=1)
         rows = np.flatnonzero(is_idle & (is_new | has_other_edges))
@@ -449,7 +488,7 @@ class Simulation:
         rows, sources = rows[sources >= 0], sources[sources >= 0]
         if not len(rows):
             return
-        manager.edge_pairs[rows] = edge_pairs[rows]
+        manager.face_pairs[rows] = edge_pairs[rows]
         manager.law[rows] = manager.law[sources]
         manager.closure_offset[rows] = manager.closure_offset[sources]
         joints.continue_joints(rows, sources)
@@ -457,8 +496,7 @@ class Simulation:
         balance.booked_dissipation[rows] = balance.booked_dissipation[sources]
         self.bind()
         # laws have water pressures
-        change = apply_loads(self.scene, self.blocks, manager, self.water_time)
-        balance.change_loads(self.blocks, change, self.dt)
+        balance.change_loads(self.blocks, self._apply_loads(), self.dt)
 
     def _transfer_joints(self) -> None:
         """Update joints and energies of contacts whose corners went on to other edges.
@@ -502,36 +540,43 @@ class Simulation:
 
     def shear_displacement(self, moving: int, base: int) -> float:
         """Shear displacement (m) of the joint between two blocks, mean over its area."""
-        return abs(float(self.area_fractions(moving, base) @ self.joints.delta[:, 1]))
+        mean = self.area_fractions(moving, base) @ self.joints.delta[:, 1:]
+        return float(vector_length(mean[None])[0])
 
     # ------------------------------------------------------------------ saved states
 
     def state(self) -> SavedState:
         """A copy of everything that later steps depend on."""
-        arrays = {path: np.array(attrgetter(path)(self)) for path in (*STATE, CONTACT_KEYS)}
+        paths = (*self.state_paths, CONTACT_KEYS)
+        arrays = {path: np.array(attrgetter(path)(self)) for path in paths}
         return self.joints.snapshot() | arrays
 
     def _restore(self, saved: SavedState, step: float | None) -> None:
         """Return to a saved state; with `step`, continue with this time step (s)."""
-        for path in STATE:
+        for path in self.state_paths:
             holder_path, _, name = path.rpartition(".")
             holder = attrgetter(holder_path)(self) if holder_path else self
             value = saved[path]
-            if path in UPDATED_IN_PLACE:
+            if path in self.updated_in_place:
                 getattr(holder, name)[:] = value
             else:
                 setattr(holder, name, value.copy() if value.ndim else value.item())
         manager = self.manager
         blocks = self.blocks
         blocks.remove(np.flatnonzero(blocks.is_removed).tolist())
-        corner, edge = saved[CONTACT_KEYS]
-        manager.contacts = Contacts(manager.outlines, corner, edge, blocks.motion)
-        self.joints.restore(saved, manager.law, manager.edge_pairs)
+        self._restore_contacts(saved)
+        self.joints.restore(saved, manager.law, manager.face_pairs)
         if step:
             self._change_time_step(step)
             self.limit.update(self.scene, blocks, self.contacts, self.joints)
             self.limit.require_stable(step)
         self.bind()
+
+    def _restore_contacts(self, saved: SavedState) -> None:
+        """Make the contacts of a saved state again."""
+        manager = self.manager
+        corner, edge = saved[CONTACT_KEYS]
+        manager.contacts = Contacts(manager.outlines, corner, edge, self.blocks.motion)
 
     def save(self, folder: Path, saved: SavedState | None = None) -> None:
         """Write a state (default: the present one) and its scene into a folder; its other files
@@ -557,12 +602,9 @@ class Simulation:
 
         Raises ValueError if the file is missing, damaged or of another version.
         """
-        places = [Path(folder) / part / FILE for part in ("", "state", "last_valid_state")]
-        file = next((place for place in places if place.is_file()), None)
-        if not file:
-            raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
+        file = find_state(folder)
         try:
-            version, scene, saved = _read_state(file)
+            version, scene, saved = cls._read_state(file)
         except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
             raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
         if scene is None:
@@ -572,20 +614,37 @@ class Simulation:
             )
         return cls(scene, step, saved)
 
+    @classmethod
+    def _read_state(cls, file: Path) -> tuple[int, Scene | None, SavedState]:
+        """Version, scene and state of a file; no scene for another version than `VERSION`."""
+        data = read_arrays(file)
+        version = int(data["version"])
+        if version != VERSION:
+            return version, None, {}
+        files = Files(known=json.loads(str(data["files"])))
+        scene = cls.parse(str(data["scene"]), str(file), files)
+        joints = [f"{part}-{i}" for part in STATE_PARTS for i in range(len(scene.laws))]
+        names = (*cls.state_paths, CONTACT_KEYS, "first_touch", *joints)
+        return version, scene, {name: data[name] for name in names}
 
-def _read_state(file: Path) -> tuple[int, Scene | None, SavedState]:
-    """Version, scene and state of a file; no scene for another version than `VERSION`."""
+
+def find_state(folder: Path) -> Path:
+    """Return the file of the state in the folder of a run, or in the state folder in it.
+
+    Raises ValueError if there is none.
+    """
+    places = [Path(folder) / part / FILE for part in ("", "state", "last_valid_state")]
+    file = next((place for place in places if place.is_file()), None)
+    if not file:
+        raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
+    return file
+
+
+def read_arrays(file: Path) -> SavedState:
+    """Read all arrays of a file of a state."""
     # ZIP files have checksums. Opened here, because numpy leaves a damaged file open.
     with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-        data = {name: stored[name] for name in stored.files}
-    version = int(data["version"])
-    if version != VERSION:
-        return version, None, {}
-    files = Files(known=json.loads(str(data["files"])))
-    scene = parse(str(data["scene"]), str(file), files)
-    joints = [f"{part}-{i}" for part in STATE_PARTS for i in range(len(scene.laws))]
-    names = (*STATE, CONTACT_KEYS, "first_touch", *joints)
-    return version, scene, {name: data[name] for name in names}
+        return {name: stored[name] for name in stored.files}
 
 
 def require_text(scene: Scene) -> None:

@@ -9,7 +9,7 @@ from jointlaw.native.build import library_name as law_library_name
 from . import layout
 
 HERE = Path(__file__).parent
-NAMES = ("blocks.c", "corners.c", "bolts.c", "relaxation.c", "face_contacts.c")
+NAMES = ("blocks.c", "corners.c", "bolts.c", "relaxation.c", "face_contacts.c", "face_points.c")
 SOURCES = tuple(HERE / name for name in NAMES)
 BUILT = HERE / "built"  # the library, and layout.h
 

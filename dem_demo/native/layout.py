@@ -225,6 +225,19 @@ POINTS = {
     "point": Field("double *", "(capacity, 3): on face a, m"),
     "area": Field("double *", "(capacity,): m2"),
 }
+FACE_POINTS = {
+    "n_blocks": Field("long long", "n"),
+    "n_points": Field("long long", "k"),
+    "motion": Field("const double *", "(12, n): as in dem_step; the places are read"),
+    "axes": Field("const double *", "(n, 3, 3): principal axes of the blocks, as columns"),
+    "block_a": Field("const long long *", "(k,): block on whose face the point lies"),
+    "block_b": Field("const long long *", "(k,): the other block"),
+    "local_point": Field("const double *", "(k, 3): from the centroid of a, along its axes, m"),
+    "local_frame": Field("const double *", "(k, 3, 3): normal, axes 2 and 3, along the axes of b"),
+    "plane_offset": Field("const double *", "(k,): m, of the face of b from its centroid"),
+    "closure": Field("double *", "(k,): m, depth of the point below the plane of b"),
+    "kinematics": Field("double *", "(k, 3, 12): of closure and shears by motions of a, b"),
+}
 BOLTS = {
     "n_bolts": Field("long long", "b"),
     "n_blocks": Field("long long", "n"),
@@ -256,6 +269,7 @@ STRUCTURES = {
     "dem_relaxation": RELAXATION,
     "dem_solids": SOLIDS,
     "dem_points": POINTS,
+    "dem_face_points": FACE_POINTS,
     "dem_bolts": BOLTS,
     "dem_relaxed_bolts": RELAXED_BOLTS,
 }

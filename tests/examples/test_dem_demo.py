@@ -245,14 +245,14 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
 def test_history_survives_a_gap():
     """A joint that opens by less than the range of contact detection keeps its history."""
     sim = Simulation(parse(SHORT.replace("velocity = [0.0, 0.1]", "velocity = [0.0, 0.3]")))
-    edge_pairs = sim.manager.edge_pairs
+    face_pairs = sim.manager.face_pairs
     places = sim.joints.place.copy()
     has_opened = False
     for _ in range(600):
         sim.step()
         has_opened |= bool((sim.joints.traction[sim.manager.between(1, 2), 0] == 0).all())
     assert has_opened
-    assert sim.manager.edge_pairs is edge_pairs  # the list of contacts never changed
+    assert sim.manager.face_pairs is face_pairs  # the list of contacts never changed
     assert (sim.joints.place == places).all()
 
 
@@ -264,7 +264,7 @@ def test_contacts_that_form_in_a_run_have_no_bond():
     sim = Simulation(parse(f"[laws.rock]\n{ROCK}{BOND}{BASE}{ONE}[run]\nend = 0.1\n"))
     for has_started, stress in ((False, -1e3), (True, 0.0)):
         new = np.full(sim.joints.n, -1)
-        sim.joints.rearrange(new, sim.manager.law, sim.manager.edge_pairs, has_started)
+        sim.joints.rearrange(new, sim.manager.law, sim.manager.face_pairs, has_started)
         F, _, _ = sim.joints.trial(np.tile([-1e-6, 0.0], (sim.joints.n, 1)))
         assert F[:, 0] == pytest.approx(stress)
 

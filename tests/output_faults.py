@@ -39,7 +39,7 @@ OTHER_UNIT = {
 }  # fmt: skip
 # Commands by which a page says where its numbers come from
 COMMAND_ON_PAGE = re.compile(r"docs/make_all\.py|pytest |python -m |`jointlaw \w+ ")
-NUMBER = re.compile(r"(?<![\w.^/\[-])\d+(?:\.\d+)?(?=(?:e-?\d+)?(?![\w.]*\w))")
+NUMBER = re.compile(r"(?<![\w.^/\[-])\d[\d_]*(?:\.\d+)?(?=(?:e-?\d+)?(?![\w.]*\w))")
 NOT_PROSE = re.compile(r"`[^`]*`|\$[^$]*\$|\]\([^)]*\)|Eq\. [\d, -]+|Figure \d+|<[^>]*>")
 DROP = """
     def _without(table, key, *rest):
@@ -321,7 +321,8 @@ def pages():
 def printed_parts(text):
     """Spans (start, end) of a page whose numbers a command prints.
 
-    Tables between marks, and paragraphs and tables that name a command, or follow one that does.
+    Tables between marks; paragraphs that name a command, and tables below them; all of README,
+    for whose numbers a table of validation.md names the commands.
     """
     for match in re.finditer(r"<!-- ([\w-]+) -->\n(.*?)<!-- end of \1 -->", text, re.DOTALL):
         yield match.span(2)
@@ -335,7 +336,9 @@ def printed_parts(text):
     previous = ""
     for paragraph in paragraphs:
         is_table = paragraph[0].startswith("|")
-        if COMMAND_ON_PAGE.search(paragraph[0] + (previous if is_table else "")):
+        is_readme = "<!-- test command -->" in text  # a table of validation.md has its commands
+        names_command = COMMAND_ON_PAGE.search(paragraph[0] + (previous if is_table else ""))
+        if names_command or is_readme:
             yield paragraph.span()
         previous = paragraph[0]
 

@@ -22,6 +22,9 @@ from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tolerance import EXCURSIONS
 from jointlaw.parameters.resolution import NAMED_RESOLUTIONS
 
+# m: of the path of the study of one plane
+PLANE_CLOSURE = 0.5e-6
+PLANE_SHEAR = 1.5e-6
 # the law of the studies of one plane and, with other orientations, of reduced models
 ANISOTROPIC = jl.JointLaw(
     orientation=jl.Orientation(3.0, 0.0, 0.3),
@@ -96,6 +99,7 @@ def one_plane():
             difference, shear_across = plane_error(law, np.radians(degrees))
             cells.append(f"{difference:.0e}")
         rows.append([f"{degrees:g}", *cells, f"{shear_across:.1%}"])
+    print(f"closed by {1e6 * PLANE_CLOSURE:.1f} um, sheared by {1e6 * PLANE_SHEAR:.1f} um and back")
     head = ["azimuth (deg)", *(f"difference at {name}" for name in names), "shear across the plane"]
     print_table(head, rows)
 
@@ -107,9 +111,10 @@ def plane_error(law, azimuth):
     spatial_joint = law.joint()
     planar_joint = replace(law, plane=azimuth).joint()
     stresses = []
-    close = [[5e-7, 0.0]]
-    shear_forward = [[0.0, 1e-8]] * 149
-    shear_back = [[0.0, -1e-8]] * 150
+    close = [[PLANE_CLOSURE, 0.0]]
+    steps = round(PLANE_SHEAR / 1e-8)
+    shear_forward = [[0.0, 1e-8]] * steps
+    shear_back = [[0.0, -1e-8]] * steps
     for closing, shearing in close + shear_forward + shear_back:
         F, _ = spatial_joint.update([closing, *(shearing * along)], tangent=False)
         G, _ = planar_joint.update([closing, shearing], tangent=False)

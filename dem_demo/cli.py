@@ -42,6 +42,7 @@ from .scene import TEMPLATE, Scene, SceneError, shipped
 from .scene.laws import law_warnings
 from .space import Equilibrium, SpaceScene, Statics, load
 from .space import output as space_output
+from .space.loads import floating_blocks as floating_blocks_in_space
 from .space.strength import strength_reduction as space_strength_reduction
 from .studies import ablate, compare, strength
 from .studies.limit_analysis import format_bound, limit_factor
@@ -234,11 +235,29 @@ def _check_in_space(scene: SpaceScene) -> None:
     statics = Statics(scene)
     result = statics.solve()
     _describe_in_space(statics, result)
+    floats = floating_blocks_in_space(scene, statics.surfaces, statics.mass)
+    _print_floating_blocks(scene, floats)
+    _check_water_tables_in_space(scene)
     for number, (name, law) in enumerate(scene.laws.items()):
         stress = result.traction[statics.law == number, 0].max(initial=0.0)
         if isinstance(law, JointLaw):
             _warn_of_closure_range(name, law, float(stress))
     print("the scene is valid")
+
+
+def _check_water_tables_in_space(scene: SpaceScene) -> None:
+    """Print the verdict on the equilibrium with each later water table, after all stages."""
+    excavated = scene.after_stages(len(scene.stages))
+    for start, _ in scene.water_changes:
+        print(f"with the water table of {start:g} s, on joints without history:")
+        _print_verdict_in_space(Statics(excavated.with_water_at(start)))
+
+
+def _print_verdict_in_space(statics: Statics) -> None:
+    """Print the verdict on the equilibrium of a scene in space, with the unstable blocks."""
+    result = statics.solve()
+    print(f"initial state: {result.verdict.value}")
+    _print_unstable(statics.scene, result.verdict.value, result.unstable)
 
 
 def _report(sim: Simulation, record: RunRecord, summary: dict, initial_dt: float) -> None:
@@ -424,9 +443,13 @@ def _warn_of_drawn_overlaps(scene: Scene) -> None:
 
 def _warn_of_floating_blocks(sim: Simulation) -> None:
     """Name the blocks that the water lifts with more than their weight."""
-    floats = floating_blocks(sim.scene, sim.blocks, sim.manager)
+    _print_floating_blocks(sim.scene, floating_blocks(sim.scene, sim.blocks, sim.manager))
+
+
+def _print_floating_blocks(scene: Scene | SpaceScene, floats: np.ndarray) -> None:
+    """Print the blocks (n,) that float, if any."""
     if floats.any():
-        blocks = format_blocks(list_blocks(sim.scene, floats))
+        blocks = format_blocks(list_blocks(scene, floats))
         count = int(floats.sum())
         verb = "block floats" if count == 1 else "blocks float"
         print(f"{count} {verb}: the water lifts more than the weight; check density: {blocks}")

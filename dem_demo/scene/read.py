@@ -186,7 +186,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
         edge_laws, drives, top["gravity"], top["seismic"], top["thickness"], water, in_situ,
         pressure, stages, **monitors,
-        water_changes=_water_changes(top.get("water", {}), where),
+        water_changes=read_water_changes(top.get("water", {}), where),
         bolts=tuple(read_bolts(top["bolt"], blocks, stages, where)),
         face_pressures=tuple(read_pressures(top["pressure"], blocks, where)),
     )  # fmt: skip
@@ -271,7 +271,7 @@ def _stresses(top: Tables, blocks: list[Block], where: str) -> tuple[Stress | No
     return water, Stress(tensor, line, weight, float(is_uniform), loaded)
 
 
-def _water_changes(table: Tables, where: str) -> tuple[tuple[float, np.ndarray], ...]:
+def read_water_changes(table: Tables, where: str) -> tuple[tuple[float, np.ndarray], ...]:
     """Return times and lines of the later water tables of `[water]`. Raises ValueError."""
     changes = tuple((part["time"], part["table"]) for part in table.get("at", ()))
     times = [time for time, _ in changes]

@@ -6,6 +6,7 @@ cutting    a rock cut along joint sets
 scene      a scene in memory
 keys       the keys of all tables of a scene, with a rule for each value
 read       a scene, in the plane or in space, from its file
+loads      water on faces and in joints, stress from outside, and other loads
 contacts   contact points of faces that lie on each other, and their kinematics
 statics    static equilibrium, and blocks that have none
 strength   factor of safety, and blocks that fail first

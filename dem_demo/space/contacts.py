@@ -16,6 +16,7 @@ code can carry it. Faces that are tilted by more than 2 degrees against each oth
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +80,17 @@ class Surfaces:
         )  # fmt: skip
         self.place()
 
+    @cached_property
+    def triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles that cover the faces: their vertices (t, 3), counter-clockwise from outside,
+        and the face (t,) of each."""
+        counts = np.diff(self.first_corner) - 2
+        face = np.repeat(np.arange(len(counts)), counts)
+        second = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+        start = self.first_corner[face]
+        corners = np.stack([start, start + second, start + second + 1], axis=1)
+        return self.corner[corners], face
+
     def place(self) -> None:
         """Compute vertices, normals and boxes at the present positions and rotations."""
         self.arrays.call("place_solids")
@@ -130,15 +142,20 @@ class ContactPoints(NamedTuple):
     contact: np.ndarray
 
 
-def find_contacts(surfaces: Surfaces, reach: np.ndarray, max_overlap: float) -> ContactPoints:
+def find_contacts(
+    surfaces: Surfaces, reach: np.ndarray, max_overlap: float, is_removed: np.ndarray | None = None
+) -> ContactPoints:
     """Find all contacts of faces at the present places of the blocks.
 
     reach (n,) in m: two faces are in contact where their gap is below the sum of the reaches.
     max_overlap: largest depth of a contact, as a fraction of the width of the narrower block.
+    is_removed (n,): blocks that touch nothing, by default none.
 
     Raises ValueError for faces of too many corners.
     """
     pairs = surfaces.near_pairs(reach)
+    if is_removed is not None:
+        pairs = np.ascontiguousarray(pairs[~is_removed[pairs].any(axis=1)])
     width = surfaces.width[pairs].min(axis=1)
     max_gap = reach[pairs].sum(axis=1)
     max_depth = max_overlap * width

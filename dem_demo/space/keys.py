@@ -12,6 +12,7 @@ from ..scene.keys import (
     FLAG,
     LIST,
     MAX_SEISMIC_COEFFICIENT,
+    NOT_NEGATIVE,
     POSITIVE,
     TABLE,
     TEXT,
@@ -44,6 +45,45 @@ def points(name: str, value: Any) -> np.ndarray:
     return np.array(rows)
 
 
+def level(name: str, value: Any) -> np.ndarray:
+    """Require one point of a horizontal plane, or three points of another plane (m).
+
+    Returns coefficients (3,) of its height z = c . (1, x, y). Raises ValueError.
+    """
+    rows = np.array([vector(name, point) for point in LIST(name, value)]).reshape(-1, 3)
+    if len(rows) == 1:
+        return np.array([rows[0, 2], 0.0, 0.0])
+    if len(rows) != 3:
+        raise ValueError(
+            f"{name}: must be one point [x, y, z] of a level, or three of a plane that is not level"
+        )
+    plan = rows[1:, :2] - rows[0, :2]
+    sides = np.linalg.norm(plan, axis=1)
+    if not abs(np.linalg.det(plan)) > MIN_LEVEL_SINE * sides.prod():
+        raise ValueError(
+            f"{name}: its three points lie on one line seen from above, so they give no height "
+            "elsewhere; move one of them aside"
+        )
+    slope = np.linalg.solve(plan, rows[1:, 2] - rows[0, 2])
+    return np.array([rows[0, 2] - slope @ rows[0, :2], *slope])
+
+
+def horizontal_ratios(name: str, value: Any) -> np.ndarray:
+    """Require the ratio of the horizontal stresses to the vertical one, or two, along x and y."""
+    ratios = value if isinstance(value, list) else [value, value]
+    if len(ratios) != 2:
+        raise ValueError(f"{name} = {value!r}: must be one number, or two along x and y")
+    return np.array([NOT_NEGATIVE(name, one) for one in ratios])
+
+
+def stress_components(name: str, value: Any) -> np.ndarray:
+    """Require the components sxx, syy, szz, sxy, syz, szx (Pa). Returns the tensor (3, 3)."""
+    if not isinstance(value, list) or len(value) != 6:
+        raise ValueError(f"{name} = {value!r}: must be [sxx, syy, szz, sxy, syz, szx] in Pa")
+    xx, yy, zz, xy, yz, zx = (number(name, one) for one in value)
+    return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+
+
 def seismic_coefficients(name: str, value: Any) -> np.ndarray:
     """Require three shares of the weight."""
     shares = vector(name, value)
@@ -61,6 +101,11 @@ def not_there_yet(name: str, value: Any) -> Any:
     )
 
 
+MIN_LEVEL_SINE = 1e-6  # of the angle between two sides, seen from above, of a plane's three points
+SIDES = {  # axis and sense of the outward normals
+    "left": (0, -1.0), "right": (0, 1.0), "front": (1, -1.0), "back": (1, 1.0),
+    "bottom": (2, -1.0), "top": (2, 1.0),
+}  # fmt: skip
 ANGLE = partial(within, low=-360.0, high=360.0, unit="degrees")
 DIP = partial(within, low=0.0, high=90.0, unit="degrees below the horizontal")
 FRACTION = partial(within, low=0.0, high=1.0, unit="")
@@ -95,8 +140,11 @@ SCENE = {
     "title": TEXT, "gravity": vector, "seismic": seismic_coefficients, "density": DENSITY,
     "law": TEXT, "rough": ANGLE, "laws!": TABLE, "block": [BLOCK], "rock": [ROCK],
     "joint": [{"between!": LIST, "law!": TEXT, "rough": ANGLE}], "run": RUN,
+    "water": {
+        "table!": level, "unit_weight": POSITIVE, "at": [{"time!": POSITIVE, "table!": level}],
+    },
     **dict.fromkeys(
-        ("water", "in_situ", "excavate", "drive", "monitor", "thickness", "bolt", "pressure"),
+        ("in_situ", "excavate", "drive", "monitor", "thickness", "bolt", "pressure"),
         not_there_yet,
     ),
 }  # fmt: skip

@@ -14,10 +14,18 @@ from jointlaw.support.checks import one_of
 
 from ..scene import Files, Scene, Tables, build_law, read_tables
 from ..scene import build as build_in_plane
-from ..scene.keys import some_of
-from ..scene.read import MAX_BLOCKS, MIN_WIDTH_PER_SPACING, is_in_space, read_source
+from ..scene.keys import NOT_NEGATIVE, some_of
+from ..scene.read import (
+    MAX_BLOCKS,
+    MIN_WIDTH_PER_SPACING,
+    WATER_UNIT_WEIGHT,
+    is_in_space,
+    read_source,
+    read_water_changes,
+)
 from .cutting import PlaneSet, cut_rock, estimate_block_count, plane_normal
 from .keys import SCENE
+from .loads import SpaceStress
 from .meshes import read_solid
 from .scene import MAX_OVERLAP, SpaceBlock, SpaceRock, SpaceScene, is_anisotropic
 from .solids import OUTLINE, Solid, box, convex_solid
@@ -64,6 +72,11 @@ def build(
     laws = {
         name: _law(table, f"{where}: laws.{name}", files) for name, table in top["laws"].items()
     }
+    pressure = {
+        name: NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table["pressure"])
+        for name, table in top["laws"].items()
+        if "pressure" in table
+    }
     default = top.setdefault("law", next(iter(laws), ""))
     one_of(f"{where}: law", default, tuple(laws))
     if top["seismic"].any() and not top["gravity"].any():
@@ -75,10 +88,12 @@ def build(
     rocks = [_rock(table, blocks, top, laws, where, files) for table in top["rock"]]
     number = _require_names(blocks, rocks, where)
     pairs = _pairs(top["joint"], number, laws, where)
+    water = _stresses(top, blocks, where)
     scene = SpaceScene(
         top.get("title", where), tuple(blocks), laws, default, top.get("rough", 0.0), pairs,
-        tuple(rocks), top["gravity"], top["seismic"], top["run"].get("skin"),
-        top["run"].get("max_overlap", MAX_OVERLAP),
+        tuple(rocks), top["gravity"], top["seismic"], skin=top["run"].get("skin"),
+        max_overlap=top["run"].get("max_overlap", MAX_OVERLAP), water=water, pressure=pressure,
+        water_changes=read_water_changes(top.get("water", {}), where),
     )  # fmt: skip
     _require_rough(scene, "rough" in top, where)
     for name, value in (("files", files), ("text", text)):  # not copied by `replace`
@@ -88,14 +103,11 @@ def build(
 
 def _law(table: Any, where: str, files: Files) -> jl.Law:
     """Build a law for motion in space. Raises ValueError."""
-    if isinstance(table, dict):
-        if "plane" in table:
-            raise ValueError(
-                f"{where}.plane: joints in space shear in all directions; leave it out, and give "
-                "`rough` for the direction of axis 2"
-            )
-        if "pressure" in table:
-            raise ValueError(f"{where}.pressure: water is not there yet for blocks in space")
+    if isinstance(table, dict) and "plane" in table:
+        raise ValueError(
+            f"{where}.plane: joints in space shear in all directions; leave it out, and give "
+            "`rough` for the direction of axis 2"
+        )
     return replace(build_law(table, where, files), plane=None)
 
 
@@ -176,7 +188,9 @@ def _rock(
             [np.zeros(3) if n == OUTLINE else sets[n].rough_direction for n in piece.face_sets]
         )
         blocks.append(
-            SpaceBlock(f"{name} {i + 1}", piece, density, fixed, np.zeros(3), face_laws, axes)
+            SpaceBlock(
+                f"{name} {i + 1}", piece, density, fixed, face_laws=face_laws, face_axes=axes
+            )
         )
     messages = [f"slivers merged with neighbours: {pieces.merged}"]
     for sliver in pieces.dropped:
@@ -211,6 +225,22 @@ class _Region:
         if self.solid is not None:
             return self.solid.contains(point)
         return bool((point - self.through) @ self.normal < 0)
+
+
+def _stresses(top: Tables, blocks: list[SpaceBlock], where: str) -> SpaceStress | None:
+    """Build the stress of the table `[water]` of a scene. Raises ValueError."""
+    water = top.get("water")
+    gravity = top["gravity"]
+    if water and (gravity[:2].any() or gravity[2] > 0):
+        raise ValueError(
+            f"{where}: gravity = {gravity.tolist()} must point down, [0, 0, -9.81], for a water "
+            "table"
+        )
+    if not water:
+        return None
+    faces = sum(len(block.solid.faces) for block in blocks)
+    unit_weight = water.get("unit_weight", WATER_UNIT_WEIGHT)
+    return SpaceStress(np.eye(3), water["table"], unit_weight, 0.0, np.ones(faces, bool))
 
 
 def _require_names(blocks: list[SpaceBlock], rocks: list[SpaceRock], where: str) -> dict[str, int]:

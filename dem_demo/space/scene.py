@@ -8,7 +8,9 @@ import numpy as np
 import jointlaw as jl
 
 from ..scene import Files
+from ..scene.keys import Tables
 from ..scene.scene import MAX_SKIN_PER_WIDTH, SKIN_PER_MEDIAN_WIDTH
+from .loads import SpaceStress
 from .solids import Solid
 
 MAX_OVERLAP = 0.1  # of the width of the narrower block: deepest contact
@@ -18,9 +20,10 @@ MAX_OVERLAP = 0.1  # of the width of the narrower block: deepest contact
 class SpaceBlock:
     """A rigid convex block, as drawn.
 
-    density in kg/m3; load (3,) in N at the centroid. face_laws: name of the law of each face on a
-    joint of a rock, None for other faces; face_axes (faces, 3): direction of the law's axis 2 on
-    these faces.
+    density in kg/m3; load (3,) in N at the centroid. prescribed: motions ("x", "y", "z", "turn",
+    which is any rotation) that are fixed; of a fixed block none. face_laws: name of the law of each
+    face on a joint of a rock, None for other faces; face_axes (faces, 3): direction of the law's
+    axis 2 on these faces.
     """
 
     name: str
@@ -28,6 +31,7 @@ class SpaceBlock:
     density: float
     fixed: bool = False
     load: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    prescribed: tuple[str, ...] = ()
     face_laws: tuple[str | None, ...] = ()
     face_axes: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
@@ -35,6 +39,12 @@ class SpaceBlock:
     def centroid(self) -> np.ndarray:
         """Centre of gravity (3,) in m."""
         return self.solid.centroid
+
+    @property
+    def free_motions(self) -> np.ndarray:
+        """Mask (6,) of the motions that forces move: along x, y, z, and the three rotations."""
+        names = ("x", "y", "z", "turn", "turn", "turn")
+        return np.array([not self.fixed and name not in self.prescribed for name in names])
 
     @property
     def mass(self) -> float:
@@ -65,7 +75,15 @@ class SpaceScene:
     and angle of `[[joint]]` tables, by the numbers of two blocks.
 
     gravity (3,): acceleration (m/s2). seismic (3,): pseudo-static forces, as shares of the weight
-    of every block. skin: range (m) of contact detection, None for the default. max_overlap: deepest
+    of every block; they load blocks only, water and in-situ stress follow from `gravity`.
+
+    water: pore pressure in joints and on faces, at time 0; water_changes: later levels of the water
+    table, each a time (s) and a level (3,) as in `SpaceStress`; in_situ: stress before an
+    excavation; pressure: water pressure (Pa) in the joints of a law, by its name. stages:
+    excavation stages, each with its `blocks`, its `start` (s; None: once the rock is at rest) and
+    its `release_time` (s). removed: blocks that are absent from the beginning.
+
+    skin: range (m) of contact detection, None for the default. max_overlap: deepest
     contact, as a fraction of the width of the narrower block. reduction: strength reduction factor
     of all joints.
 
@@ -81,6 +99,12 @@ class SpaceScene:
     rocks: tuple[SpaceRock, ...] = ()
     gravity: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     seismic: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    water: SpaceStress | None = None
+    in_situ: SpaceStress | None = None
+    pressure: dict[str, float] = field(default_factory=dict)
+    stages: tuple[Tables, ...] = ()
+    removed: tuple[int, ...] = ()
+    water_changes: tuple[tuple[float, np.ndarray], ...] = ()
     skin: float | None = None
     max_overlap: float = MAX_OVERLAP
     reduction: float = 1.0
@@ -100,6 +124,48 @@ class SpaceScene:
     def acceleration(self) -> np.ndarray:
         """Gravity and pseudo-static acceleration (3,) in m/s2."""
         return self.gravity + np.linalg.norm(self.gravity) * self.seismic
+
+    @property
+    def wet(self) -> bool:
+        """Whether there is water, so that stresses of joints are effective stresses."""
+        return self.water is not None or any(self.pressure.values())
+
+    @property
+    def is_removed(self) -> np.ndarray:
+        """Mask (n,) of the blocks that are absent from the beginning."""
+        mask = np.zeros(len(self.blocks), bool)
+        mask[list(self.removed)] = True
+        return mask
+
+    @property
+    def excavated(self) -> "SpaceScene":
+        """The scene after all excavation stages, under the same in-situ stress, with its last water
+        table."""
+        return self.after_stages(len(self.stages)).with_water_at(np.inf)
+
+    def after_stages(self, count: int) -> "SpaceScene":
+        """The scene without the blocks of its first `count` excavation stages, and without later
+        stages."""
+        if not self.stages:
+            return self
+        blocks = [i for stage in self.stages[:count] for i in stage["blocks"]]
+        return replace(self, stages=(), removed=(*self.removed, *blocks))
+
+    def with_water_at(self, time: float) -> "SpaceScene":
+        """The scene with its water table at a time (s) as the only one."""
+        if not self.water_changes:
+            return self
+        return replace(self, water=self.water_at(time), water_changes=())
+
+    def water_at(self, time: float) -> SpaceStress | None:
+        """The pore pressure at a time (s); the water table changes linearly between its times."""
+        if self.water is None or not self.water_changes or time <= 0.0:
+            return self.water
+        times = [0.0, *(time for time, _ in self.water_changes)]
+        levels = np.array([self.water.level, *(level for _, level in self.water_changes)])
+        return replace(
+            self.water, level=np.array([np.interp(time, times, part) for part in levels.T])
+        )
 
     def weakened(self, factor: float) -> "SpaceScene":
         """The scene with the strength of all joints divided by a factor, their stiffness kept.

@@ -16,9 +16,11 @@ import jointlaw as jl
 
 from ..contact import tabulate_first_loading
 from ..contact.joints import stick_response
+from ..dynamics.equilibrium import MIN_FORCE_SCALE, STANDARD_GRAVITY
 from ..dynamics.relaxation import Verdict
 from ..dynamics.search import EquilibriumSearch, StaticSystem
 from .contacts import Surfaces, contact_axes, contact_rows, find_contacts, turned_from_dip
+from .loads import applied_loads
 from .scene import SpaceScene
 
 
@@ -84,8 +86,10 @@ class Equilibrium(NamedTuple):
 
     verdict; unstable (n,): blocks without static equilibrium. displacement (n, 3) in m, rotation
     (n, 3): rotation vectors in rad. closure and shears d (k, 3) in m and tractions (k, 3) in Pa of
-    the contact points: normal stress, and shear stresses along axes 2 and 3. unbalanced_ratio: the
-    largest unbalanced force of the other blocks over their weight.
+    the contact points: normal stress, and shear stresses along axes 2 and 3; effective stresses
+    where there is water. unbalanced_ratio: the largest unbalanced force of the other blocks over
+    their weight, which counts as on Earth without gravity, and as at least a millionth of the
+    largest load.
     """
 
     verdict: Verdict
@@ -101,7 +105,9 @@ class Statics:
     """The blocks of a scene as drawn, their contacts and the law of each contact point.
 
     surfaces, points, axes, rows: geometry of the contacts (`contacts.py`); law (k,): numbers of the
-    laws. mass (n,) in kg; weight (n, 3) in N: gravity, seismic and other forces; is_free (n,).
+    laws. mass (n,) in kg; gravity (n, 6) in N: with the pseudo-static seismic forces; loads (n, 6):
+    all other forces and moments (`applied_loads`). is_free_motion (n, 6): motions that forces move;
+    is_free (n,): blocks with such motions; is_removed (n,): blocks that are absent.
 
     Raises ValueError for blocks that overlap as drawn.
     """
@@ -109,23 +115,28 @@ class Statics:
     def __init__(self, scene: SpaceScene) -> None:
         self.scene = scene
         blocks = scene.blocks
-        self.is_free = np.array([not block.fixed for block in blocks])
+        self.is_removed = scene.is_removed
+        self.is_free_motion = np.array([block.free_motions for block in blocks])
+        self.is_free_motion[self.is_removed] = False
+        self.is_free = self.is_free_motion.any(axis=1)
         self.surfaces = Surfaces([block.solid for block in blocks], self.is_free)
         self._require_apart()
-        self.points = find_contacts(self.surfaces, scene.skins, scene.max_overlap)
+        self.points = find_contacts(self.surfaces, scene.skins, scene.max_overlap, self.is_removed)
         self.law, axis_2 = self._laws_and_axes()
         self.axes = contact_axes(self.surfaces, self.points, axis_2)
         self.rows = contact_rows(self.surfaces, self.points, self.axes)
         density = np.array([block.density for block in blocks])
         self.mass = density * self.surfaces.volume
         self.inertia = density[:, None] * self.surfaces.moments
-        loads = np.array([block.load for block in blocks])
-        self.weight = self.mass[:, None] * scene.acceleration + loads
+        self.gravity = np.zeros((len(blocks), 6))
+        self.gravity[:, :3] = self.mass[:, None] * scene.acceleration
+        self.loads = applied_loads(scene, self.surfaces, self.rows, self.law)
 
     def _require_apart(self) -> None:
         """Require that no blocks overlap by more than their skins. Raises ValueError."""
         skins = self.scene.skins
         pairs = self.surfaces.near_pairs(np.zeros(len(skins)))
+        pairs = pairs[~self.is_removed[pairs].any(axis=1)]
         allowed = skins[pairs].min(axis=1)
         depth = -self.surfaces.separations(pairs, float(allowed.min(initial=np.inf)))
         for a, b in pairs[depth > allowed][:1].tolist():
@@ -173,9 +184,9 @@ class Statics:
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """Motion (n, 6) of a block per unit of a scaled motion; zero for fixed blocks."""
+        """Motion (n, 6) of a block per unit of a scaled motion; zero for fixed motions."""
         inertia = np.concatenate([np.repeat(self.mass[:, None], 3, axis=1), self.inertia], axis=1)
-        return self.is_free[:, None] / np.sqrt(inertia)
+        return self.is_free_motion / np.sqrt(inertia)
 
     def search(
         self, scene: SpaceScene | None = None, excluded: np.ndarray | None = None
@@ -194,14 +205,13 @@ class Statics:
         area = rows.area
         if excluded is not None:
             area = np.where(excluded[rows.block_a] | excluded[rows.block_b], 0.0, area)
-        moments = np.zeros_like(self.weight)
         return EquilibriumSearch(
             StaticSystem(
                 self.mass,
                 self.surfaces.radius,
-                np.repeat(self.is_free[:, None], 6, axis=1),
+                self.is_free_motion,
                 self.scale,
-                np.concatenate([self.weight, moments], axis=1) * self.is_free[:, None],
+                (self.gravity + self.loads) * self.is_free_motion,
                 rows.block_a,
                 rows.block_b,
                 rows.kinematics * of_blocks[:, None],
@@ -224,12 +234,10 @@ class Statics:
         motion = search.expand(y) * self.scale
         d = (search.start + search.kinematics @ y).reshape(3, -1).T
         unbalanced = search.unbalanced_force(y)
-        size = np.hypot(
-            np.linalg.norm(unbalanced[:, :3], axis=1),
-            np.linalg.norm(unbalanced[:, 3:], axis=1) / self.surfaces.radius,
-        )
+        size = self._size(unbalanced)
         is_stable = self.is_free & ~solution.unstable
-        weight = np.maximum(np.linalg.norm(self.weight, axis=1), 1e-300)
+        weight = self.mass * (np.linalg.norm(self.scene.acceleration) or STANDARD_GRAVITY)
+        weight = np.maximum(weight, MIN_FORCE_SCALE * self._size(self.gravity + self.loads).max())
         return Equilibrium(
             verdict,
             solution.unstable,
@@ -239,6 +247,11 @@ class Statics:
             search.joints.trial(d)[0],
             float((size / weight)[is_stable].max(initial=0.0)),
         )
+
+    def _size(self, force: np.ndarray) -> np.ndarray:
+        """Sizes (n,) in N of forces and moments (n, 6); moments over the radius of the block."""
+        moment = np.linalg.norm(force[:, 3:], axis=1) / self.surfaces.radius
+        return np.hypot(np.linalg.norm(force[:, :3], axis=1), moment)
 
     def displacements(
         self,

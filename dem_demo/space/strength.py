@@ -42,7 +42,8 @@ def factor_of_safety(
 def strength_reduction(
     scene: SpaceScene, folder: Path | None, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Compute the factor of safety of a scene.
+    """Compute the factor of safety of a scene, after all excavation stages and with its last water
+    table.
 
     folder: for finished trials; called again with it, the search continues. tell: called with each
     line of progress.
@@ -54,8 +55,9 @@ def strength_reduction(
     blocks without equilibrium when the strength is divided by 1.02 times the factor, none of them
     excluded. A number is None where none is found.
     """
-    statics = Statics(scene)
     trials = Trials(scene, folder)
+    scene = scene.excavated
+    statics = Statics(scene)
     tell("searching unstable blocks")
     unstable = trials.result("unstable", partial(_unstable_blocks, statics, scene))
     count = int(statics.is_free.sum())

@@ -123,7 +123,6 @@ DENTED = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)] + [[0.5, 0.
         (BLOCK + BLOCK, "'block' is given twice"),
         (BLOCK + block("fast", box=[1, 1, 1], velocity=[1, 0, 0]), "velocity: not there yet"),
         (BLOCK + '[[joint]]\nbetween = ["base", "no"]\nlaw = "plain"\n', "joint.0..between"),
-        (BLOCK + "[water]\ntable = [[0, 0]]\n", "water: not there yet for blocks in space"),
         (BLOCK + "[in_situ]\nk0 = 1\n", "in_situ: not there yet"),
         (BLOCK + "[run]\nend = 1\n", "run.end: not there yet"),
         (BLOCK + '[[drive]]\nmotion = "x"\n', "drive: not there yet"),

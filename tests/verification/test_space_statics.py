@@ -14,6 +14,7 @@ from dem_demo.dynamics.relaxation import Verdict
 from dem_demo.output.record import list_blocks
 from dem_demo.scene import load
 from dem_demo.space.contacts import find_contacts
+from dem_demo.space.cutting import plane_normal
 from dem_demo.space.read import parse
 from dem_demo.space.scene import SpaceBlock, SpaceScene
 from dem_demo.space.solids import extruded
@@ -236,6 +237,21 @@ def test_the_seismic_coefficient_of_a_block_on_a_plane():
         level = share * critical * np.array([0.0, cos(tilt), sin(tilt)])
         scene = replace(statics.scene, seismic=level)
         assert is_stable(Statics(scene)) == stable
+
+
+def test_the_seismic_coefficients_of_a_wedge():
+    """Factor of safety of a wedge under pseudo-static forces out of the slope, along the slope and
+    upwards, within 0.1 % of the equilibrium along the line of intersection."""
+    wedge = WEDGES[2]
+    coefficients = [0.03, -0.12, 0.06]
+    seismic = lines(seismic=coefficients)
+    statics = Statics(parse(seismic + wedge_text(wedge, coulomb(FRICTION))))
+    axes = np.column_stack([plane_normal(*wedge.a), plane_normal(*wedge.b), line_of(wedge)])
+    normal_a, normal_b, drive = np.linalg.solve(axes, np.array([0.0, 0.0, 1.0]) - coefficients)
+    assert min(normal_a, normal_b) > 0
+    expected = (normal_a + normal_b) * FRICTION / -drive
+    assert expected < 0.85 * factor_by_hand(wedge, 1.0, [0.0], FRICTION)
+    assert factor_of_safety(statics, tolerance=TOLERANCE) == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_line_of_intersection_of_symmetric_planes():

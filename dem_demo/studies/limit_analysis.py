@@ -2,19 +2,24 @@
 
 A scene can only be in equilibrium with its strength divided by F if there are contact forces that
 balance every block and respect the strength of every joint, whatever the stiffnesses. Whether there
-are any is a linear program. If there are none, equilibrium is impossible: failure is proved. If
-there are some, nothing is proved, because joints cannot choose their forces: they follow from the
-displacements, and joints that dilate less than their friction angle may fail before (non-associated
-flow). For friction alone the gap is 4 to 17 % on slopes of rock; an equilibrium that was found is
-the proof on that side.
+are any is a linear program, which minimises the unbalanced forces. If they are not zero,
+equilibrium is impossible: failure is proved. The least unbalanced forces are nearly a straight line
+over the strength, and the multipliers of the program give its slope, so that Newton's method finds
+the limit in a few programs.
+
+If there are balanced contact forces, nothing is proved, because joints cannot choose their forces:
+they follow from the displacements, and joints that dilate less than their friction angle may fail
+before (non-associated flow). For friction alone the gap is 4 to 17 % on slopes of rock; an
+equilibrium that was found is the proof on that side.
 """
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.sparse import csr_array, diags, hstack, vstack
+from scipy.optimize import OptimizeResult, linprog
+from scipy.sparse import csr_array, diags, eye, hstack, vstack
 
 import jointlaw as jl
 
@@ -30,7 +35,10 @@ TOLERANCE = 1e-3  # of the factor
 STRESSES = 7  # at which the strength of a rough law gets a tangent
 STRESS_RANGE = 1e-3, 3.0  # of the largest overburden stress: where they lie
 SLOPE_STEP = 1.05  # ratio of the two stresses that give a tangent
-INFEASIBLE = 2  # status of scipy.optimize.linprog
+BALANCED = 1e-6  # unbalanced forces over the largest load that are rounding of the solver
+STRENGTH_CHANGE = 1e-3  # relative: change of strength whose effect on a program is computed
+FIRST_RATIO = 2.0  # of factors that are tried until the blocks cannot balance
+MAX_NEWTON_TRIALS = 12  # then the search bisects
 
 
 class Strength(NamedTuple):
@@ -140,18 +148,80 @@ def peak_strength(law: jl.Law, stress: float) -> float:
     return float(np.abs(record.shear_stress).max())
 
 
-def can_balance(balance: ForceBalance, factor: float) -> bool:
-    """Whether there are contact forces that balance all blocks with the strength divided by factor.
+class Imbalance(NamedTuple):
+    """Least sum of unbalanced forces at a factor of safety, relative to the largest load; its
+    derivative by the inverse of the factor, which multiplies the strength."""
+
+    force: float
+    derivative: float
+
+
+class Program(NamedTuple):
+    """A linear program: minimise the sum of unbalanced forces.
+
+    equations (m, n), right_side (m,): balance of the m free motions. rows, limits: inequalities of
+    further lines of strengths, None without any. bounds (n, 2): of the unknowns. cost (n,).
+    """
+
+    equations: csr_array
+    right_side: np.ndarray
+    rows: csr_array | None
+    limits: np.ndarray | None
+    bounds: np.ndarray
+    cost: np.ndarray
+
+
+def least_imbalance(balance: ForceBalance, factor: float) -> Imbalance:
+    """Least unbalanced forces of all blocks with the strength divided by factor.
+
+    They are zero (`BALANCED`) if there are contact forces that balance all blocks. The derivative
+    follows from the multipliers of the linear program, which do not change to first order. Raises
+    RuntimeError where the solver finds no solution.
+    """
+    if not np.abs(balance.load).max(initial=0.0):
+        return Imbalance(0.0, 0.0)
+    program = _program(balance, factor)
+    for method in ("highs-ipm", "highs-ds"):
+        solution = linprog(
+            program.cost, A_ub=program.rows, b_ub=program.limits, A_eq=program.equations,
+            b_eq=program.right_side, bounds=program.bounds, method=method,
+        )  # fmt: skip
+        if solution.status == 0:
+            break
+    else:
+        raise RuntimeError(f"limit analysis at a factor of {factor:.4g}: {solution.message}")
+    stronger = _program(balance, factor / (1.0 + STRENGTH_CHANGE))
+    change = _change_of_minimum(program, stronger, solution)
+    return Imbalance(solution.fun, change * factor / STRENGTH_CHANGE)
+
+
+def _change_of_minimum(program: Program, changed: Program, solution: OptimizeResult) -> float:
+    """Change of the minimum of a linear program, to first order in the change of the program."""
+    x = solution.x
+    residual = (changed.right_side - program.right_side) - (
+        changed.equations - program.equations
+    ) @ x
+    change = solution.eqlin.marginals @ residual
+    if program.rows is not None:
+        slack = (changed.limits - program.limits) - (changed.rows - program.rows) @ x
+        change += solution.ineqlin.marginals @ slack
+    for column, side in enumerate((solution.lower, solution.upper)):
+        is_finite = np.isfinite(program.bounds[:, column])
+        moved = changed.bounds[is_finite, column] - program.bounds[is_finite, column]
+        change += side.marginals[is_finite] @ moved
+    return float(change)
+
+
+def _program(balance: ForceBalance, factor: float) -> Program:
+    """The linear program for the strength divided by factor.
 
     Unknowns of each contact: the normal force above -tension, N + T = p + q with p, q >= 0, and the
     shear force (mu/F) (p - q) + s with |s| bounded by the rest of the cohesion. They respect the
     steepest line of its strength by themselves; further lines are inequalities. The tension of a
-    bolt is between zero and its capacity, which is not divided. Raises RuntimeError
-    where the solver decides nothing.
+    bolt is between zero and its capacity, which is not divided. Unknowns of each motion: unbalanced
+    force in either direction. Forces are relative to the largest load.
     """
     scale = np.abs(balance.load).max()
-    if not scale:
-        return True
     area = balance.area / scale
     law = balance.law
     first = [strength.friction.argmax() for strength in balance.strengths]
@@ -163,34 +233,35 @@ def can_balance(balance: ForceBalance, factor: float) -> bool:
     tension = np.array([strength.tension for strength in balance.strengths])[law] * area / factor
     rest = np.where(free, np.inf, np.maximum(cohesion - slope * tension, 0.0))
     count = len(area)
+    motions = len(balance.load)
     cohesive = np.flatnonzero(rest > 0)
     sliding = balance.shear @ diags(slope)
+    unbalanced = eye(motions, format="csr")
     equations = hstack(
         [
             balance.normal + sliding,
             balance.normal - sliding,
             balance.shear[:, cohesive],
             balance.bolts,
+            unbalanced,
+            -unbalanced,
         ]
     ).tocsr()
     right_side = -balance.load / scale + balance.normal @ tension
-    bounds = np.zeros((equations.shape[1], 2))
-    bounds[: 2 * count, 1] = np.inf
+    unknowns = equations.shape[1]
+    bounds = np.zeros((unknowns, 2))
+    bounds[:, 1] = np.inf
     first_bolt = 2 * count + len(cohesive)
+    first_unbalanced = unknowns - 2 * motions
     bounds[2 * count : first_bolt] = np.stack([-rest[cohesive], rest[cohesive]], axis=1)
-    bounds[first_bolt:, 1] = balance.capacity / scale
-    rows, limits = _further_lines(balance, first, factor, area, slope, tension, cohesive)
-    for method in ("highs-ipm", "highs-ds"):
-        solution = linprog(
-            np.zeros(equations.shape[1]), A_ub=rows, b_ub=limits, A_eq=equations, b_eq=right_side,
-            bounds=bounds, method=method,
-        )  # fmt: skip
-        if solution.status in (0, INFEASIBLE):
-            return solution.status == 0
-    raise RuntimeError(f"limit analysis at a factor of {factor:.4g}: {solution.message}")
+    bounds[first_bolt:first_unbalanced, 1] = balance.capacity / scale
+    cost = np.zeros(unknowns)
+    cost[first_unbalanced:] = 1.0
+    rows, limits = _further_lines(balance, first, factor, area, slope, tension, cohesive, unknowns)
+    return Program(equations, right_side, rows, limits, bounds, cost)
 
 
-def _further_lines(balance, first, factor, area, slope, tension, cohesive):
+def _further_lines(balance, first, factor, area, slope, tension, cohesive, unknowns):
     """Rows and bounds of |S| <= (c + mu N)/F for all lines but the first of each contact."""
     count = len(area)
     place = np.full(count, -1)
@@ -213,7 +284,7 @@ def _further_lines(balance, first, factor, area, slope, tension, cohesive):
                     (k[has_rest], place[contacts[has_rest]], np.full(has_rest.sum(), sign)),
                 ]
                 row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
-                shape = (len(contacts), 2 * count + len(cohesive) + len(balance.capacity))
+                shape = (len(contacts), unknowns)
                 rows.append(csr_array((value, (row, column)), shape=shape))
                 limits.append(bound)
     if not rows:
@@ -245,34 +316,50 @@ def limit_factor(scene: Scene, excluded: np.ndarray | None = None) -> float | No
     strength, 0.0 where none are found with 64 times the strength.
     """
     balance = force_balance(scene, excluded)
-    low = SMALLEST_FACTOR
-    high = LARGEST_FACTOR
+    low = 0.0  # largest factor so far with which the blocks can balance
+    high = np.inf  # smallest factor so far with which they cannot
+    estimate = np.nan
     factor = 1.0
-    step = 2.0
-    if can_balance(balance, factor):
-        low = factor
-        while factor < LARGEST_FACTOR:
-            factor = min(factor * step, LARGEST_FACTOR)
-            if not can_balance(balance, factor):
-                high = factor
-                break
-            low = factor
+    for trial in itertools.count(1):
+        imbalance = least_imbalance(balance, factor)
+        if imbalance.force > BALANCED:
+            high = factor
+            estimate = _newton_estimate(high, imbalance) if trial <= MAX_NEWTON_TRIALS else np.nan
         else:
+            low = factor
+        if low == LARGEST_FACTOR:
             return None
-    else:
-        high = factor
-        while factor > SMALLEST_FACTOR:
-            factor = max(factor / step, SMALLEST_FACTOR)
-            if can_balance(balance, factor):
-                low = factor
-                break
-            high = factor
-        else:
+        if high == SMALLEST_FACTOR:
             return 0.0
-    while high > (1.0 + TOLERANCE) * low:
-        factor = float(np.sqrt(low * high))
-        if can_balance(balance, factor):
-            low = factor
-        else:
-            high = factor
-    return high
+        if high <= (1.0 + TOLERANCE) * low:
+            return high
+        factor = _next_factor(low, high, estimate)
+    raise AssertionError("unreachable: the search ends by itself")
+
+
+def _newton_estimate(factor: float, imbalance: Imbalance) -> float:
+    """Factor of safety at which the imbalance is zero, by its tangent over the strength at a
+    factor; nan where it does not fall with the strength."""
+    if not imbalance.derivative < 0.0:
+        return np.nan
+    return 1.0 / (1.0 / factor - imbalance.force / imbalance.derivative)
+
+
+def _next_factor(low: float, high: float, estimate: float) -> float:
+    """Factor that a search tries next.
+
+    The blocks can balance with the factor `low` (0.0: none known) and cannot with `high` (infinite:
+    none known). The estimate comes from `high`; it is met exactly where one mechanism decides, so
+    that a trial just below it and one just above it end the search.
+    """
+    if high == np.inf:
+        return min(FIRST_RATIO * low, LARGEST_FACTOR)
+    below = estimate / (1.0 + 0.5 * TOLERANCE)
+    above = estimate * (1.0 + 0.25 * TOLERANCE)
+    if low < below < high:
+        return max(below, SMALLEST_FACTOR)
+    if low < above < high:
+        return above
+    if low == 0.0:
+        return SMALLEST_FACTOR
+    return float(np.sqrt(low * high))

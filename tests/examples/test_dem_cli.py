@@ -81,7 +81,7 @@ def test_json_is_all_that_is_on_the_standard_output(tmp_path, capsys):
     printed = capsys.readouterr()
     (row,) = json.loads(printed.out)["rows"]
     assert row["factor_of_safety"] == pytest.approx(1.7, rel=0.01)  # 0.3 / tan(10 degrees)
-    assert row["limit_analysis"] == pytest.approx(1.7014, rel=1.5e-3)  # the bisection leaves 1e-3
+    assert row["limit_analysis"] == pytest.approx(1.7014, rel=1.5e-3)  # the search leaves 1e-3
     assert "scene: factor of safety 1.7 (at most 1.7 by limit analysis)" in printed.err
 
 
@@ -143,8 +143,8 @@ def test_all_blocks_stable_at_twice_the_strength_are_reported_in_one_plain_line(
     assert "scene: 0 blocks stay unstable at strength x 2" in lines
 
 
-STEEP_BOUND = 0.3 / math.tan(math.radians(20.0))  # 0.8242, the bisection adds up to 1e-3 of it
-PROOF = "no equilibrium exists: proved (at most 0.825 by limit analysis)"
+STEEP_BOUND = 0.3 / math.tan(math.radians(20.0))  # 0.8242, the search adds up to 1e-3 of it
+PROOF = "no equilibrium exists: proved (at most 0.824 by limit analysis)"
 
 
 def lines_of(capsys, *words):

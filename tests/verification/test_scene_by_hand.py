@@ -14,13 +14,13 @@ Lengths of joint, forces and energies are those of a section `THICKNESS` thick. 
 pairs: the value, and the absolute tolerance.
 """
 
-import csv
 import json
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
 import pytest
+from by_hand import columns, compare
 from scene_text import block, coulomb, lines
 from scipy.linalg import eigh
 
@@ -819,22 +819,6 @@ def written(request, tmp_path_factory):
     words = [str(folder / f"{scene.title}.toml"), "--no-pictures", "--vtk"]
     assert main([*words, "--out", str(folder / "out")]) == 0
     return scene, folder / "out"
-
-
-def compare(actual, expected, where):
-    """Compare columns with pairs (values, tolerance), name by name; no name may be missing."""
-    assert actual.keys() == expected.keys(), f"{where}: give every column its value by hand"
-    for name, (values, tolerance) in expected.items():
-        np.testing.assert_allclose(
-            actual[name], values, rtol=0.0, atol=tolerance, err_msg=f"{where}: {name}"
-        )
-
-
-def columns(path):
-    """Columns of a CSV file, as texts by their titles."""
-    header, *rows = csv.reader(path.read_text().splitlines())
-    assert len({*header}) == len(header)
-    return dict(zip(header, zip(*rows, strict=True), strict=True))
 
 
 def test_files_are_the_known_ones(written):

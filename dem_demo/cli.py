@@ -43,6 +43,7 @@ from .scene.laws import law_warnings
 from .space import Equilibrium, SpaceScene, Statics, load
 from .space import output as space_output
 from .space.loads import floating_blocks as floating_blocks_in_space
+from .space.pictures import MISSING, has_pyvista
 from .space.strength import strength_reduction as space_strength_reduction
 from .studies import ablate, compare, strength
 from .studies.limit_analysis import format_bound, limit_factor
@@ -211,7 +212,21 @@ def _run_in_space(options: argparse.Namespace, scene: SpaceScene) -> None:
     result = statics.solve()
     _describe_in_space(statics, result)
     print("blocks in space do not move yet: the run ends with the static equilibrium")
-    space_output.write(statics, result, options.out, options.vtk)
+    picture_format = _space_picture_format(options)
+    has_vtk = options.vtk
+    if options.format and not picture_format and find_spec("meshio"):
+        print("VTK files are written in place of pictures")
+        has_vtk = True
+    space_output.write(statics, result, options.out, has_vtk, picture_format)
+
+
+def _space_picture_format(options: argparse.Namespace) -> str | None:
+    """Format of pictures of blocks in space; None for no pictures, also where pyvista is missing,
+    after a message with the remedy."""
+    if options.format and not has_pyvista():
+        print(MISSING)
+        return None
+    return options.format
 
 
 def _describe_in_space(statics: Statics, result: Equilibrium) -> None:
@@ -537,7 +552,8 @@ def _reduce_strength(options: argparse.Namespace) -> None:
                 "continues"
             ) from None
         write_json(options.out / STRENGTH, {"version": STRENGTH_VERSION, "rows": rows})
-        pictures = "" if isinstance(scene, SpaceScene) else " and pictures of the failure"
+        has_pictures = not isinstance(scene, SpaceScene) or has_pyvista()
+        pictures = " and pictures of the failure" if has_pictures else ""
         print(f"{STRENGTH}{pictures} in {options.out}")
     if options.json:
         print((options.out / STRENGTH).read_text(encoding="utf-8"), end="")
@@ -548,7 +564,8 @@ def _strength_rows(options: argparse.Namespace, scene: Scene | SpaceScene) -> It
     tell = partial(print, flush=True)
     if isinstance(scene, SpaceScene):
         _refuse_until(options)
-        yield space_strength_reduction(scene, options.out, tell)
+        picture_format = _space_picture_format(options)
+        yield space_strength_reduction(scene, options.out, tell, picture_format)
         return
     default_end = min(scene.run.end, FAILURE_RUN_TIME)
     until = default_end if options.until is None else options.until

@@ -103,7 +103,7 @@ PARTS = {
     ),
     "space": Part(
         "docs/draw/space.py FOLDER",
-        pictures={"wedge.png": "wedge.png", "face-contact.png": "face-contact.png"},
+        pictures={name: name for name in ("wedge.png", "slope-3d-joints.png", "face-contact.png")},
     ),
     "envelopes": Part(
         "docs/draw/envelopes.py FOLDER",

@@ -9,6 +9,8 @@ read       a scene, in the plane or in space, from its file
 loads      water on faces and in joints, stress from outside, and other loads
 contacts   contact points of faces that lie on each other, and their kinematics
 statics    static equilibrium, and blocks that have none
+drawing    what a picture shows: faces, edges, states, rough directions
+pictures   pictures by pyvista
 strength   factor of safety, and blocks that fail first
 """
 

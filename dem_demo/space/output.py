@@ -1,4 +1,5 @@
-"""Files of an equilibrium in space: summary.json, blocks.csv, and VTK files for ParaView."""
+"""Files of an equilibrium in space: summary.json, blocks.csv, pictures, and VTK files for
+ParaView."""
 
 from pathlib import Path
 from typing import Any
@@ -7,8 +8,11 @@ import numpy as np
 
 from jointlaw.support.files import SUMMARY, write_json
 
+from ..dynamics.relaxation import Verdict
 from ..output.folder import BLOCKS, clear_run
 from ..output.record import list_blocks, write_csv
+from .drawing import Drawing
+from .pictures import JOINTS_PULL, SpacePictures
 from .statics import Equilibrium, Statics
 
 SUMMARY_VERSION = 1
@@ -39,20 +43,40 @@ def summarise(statics: Statics, result: Equilibrium) -> dict[str, Any]:
     }
 
 
-def write(statics: Statics, result: Equilibrium, folder: Path, vtk: bool) -> dict[str, Any]:
+def write(
+    statics: Statics, result: Equilibrium, folder: Path, vtk: bool, picture_format: str | None
+) -> dict[str, Any]:
     """Write the files of an equilibrium, and return the content of summary.json.
 
     Results of another run in the folder are replaced. vtk: whether to write VTK files, which needs
-    meshio.
+    meshio. picture_format: of the pictures, which need pyvista; None for no pictures.
     """
     clear_run(folder)
     summary = summarise(statics, result)
     write_blocks(statics, result, folder / BLOCKS)
+    if picture_format:
+        summary["files"] += write_pictures(statics, result, folder, picture_format)
     if vtk:
         write_vtk(statics, result, folder / VTK)
         summary["files"] += [f"{VTK}/blocks.vtu", f"{VTK}/contacts.vtu"]
     write_json(folder / SUMMARY, summary)
     return summary
+
+
+def write_pictures(
+    statics: Statics, result: Equilibrium, folder: Path, picture_format: str
+) -> list[str]:
+    """Draw the blocks with the verdict on each, and the joints of a scene with rough directions,
+    its blocks pulled apart; return the names of the files. Needs pyvista."""
+    is_decided = result.verdict is not Verdict.NOT_DECIDED
+    drawing = Drawing(statics, result.unstable, is_decided)
+    names = [f"start.{picture_format}"]
+    SpacePictures(drawing, with_hatching=False).write(folder / names[0], result.verdict.value)
+    if len(drawing.hatch):
+        names.append(f"joints.{picture_format}")
+        apart = SpacePictures(drawing, [drawing.pulled_apart(JOINTS_PULL)])
+        apart.write(folder / names[1], "pulled apart to show the joints")
+    return names
 
 
 def write_blocks(statics: Statics, result: Equilibrium, path: Path) -> None:

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..output.record import format_blocks, list_blocks
 from ..studies.strength import LOG_FACTOR, SHOWN_REDUCTION, STRENGTHENED, LimitSearch, Trials
+from .drawing import Drawing
+from .pictures import SpacePictures
 from .scene import SpaceScene
 from .statics import Statics
 
@@ -40,13 +42,17 @@ def factor_of_safety(
 
 
 def strength_reduction(
-    scene: SpaceScene, folder: Path | None, tell: Callable[[str], None]
+    scene: SpaceScene,
+    folder: Path | None,
+    tell: Callable[[str], None],
+    picture_format: str | None = None,
 ) -> dict[str, Any]:
     """Compute the factor of safety of a scene, after all excavation stages and with its last water
     table.
 
     folder: for finished trials; called again with it, the search continues. tell: called with each
-    line of progress.
+    line of progress. picture_format: of `initiating.FORMAT` in the folder, a picture of the blocks
+    that fail first, which needs pyvista; None for no picture.
 
     Returns a row. `unstable`: names and centroids (m) of blocks without static equilibrium.
     `excluded`: the same blocks, or if all blocks are unstable, only blocks that are unstable with
@@ -88,7 +94,23 @@ def strength_reduction(
         )
         row["initiating_blocks"] = [block for block in failing if block["block"] not in names]
         tell(f"initiating blocks: {format_blocks(row['initiating_blocks'])}")
+        if folder and picture_format and row["initiating_blocks"]:
+            path = folder / f"initiating.{picture_format}"
+            _draw_initiating(statics, row, factor, path)
     return row
+
+
+def _draw_initiating(statics: Statics, row: dict[str, Any], factor: float, path: Path) -> None:
+    """Draw the initiating blocks of a row of `strength_reduction` among all blocks."""
+    names = [block.name for block in statics.scene.blocks]
+    unstable, initiating = (
+        np.isin(names, [block["block"] for block in row[key]])
+        for key in ("unstable", "initiating_blocks")
+    )
+    pictures = SpacePictures(
+        Drawing(statics, unstable), marked=initiating, mark="initiating block", with_hatching=False
+    )
+    pictures.write(path, f"factor of safety {factor:.3g}")
 
 
 def _unstable_blocks(statics: Statics, scene: SpaceScene) -> list[dict[str, Any]]:

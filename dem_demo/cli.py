@@ -252,12 +252,20 @@ def _check_in_space(scene: SpaceScene) -> None:
     _describe_in_space(statics, result)
     floats = floating_blocks_in_space(scene, statics.surfaces, statics.mass)
     _print_floating_blocks(scene, floats)
+    _check_stages_in_space(scene)
     _check_water_tables_in_space(scene)
     for number, (name, law) in enumerate(scene.laws.items()):
         stress = result.traction[statics.law == number, 0].max(initial=0.0)
         if isinstance(law, JointLaw):
             _warn_of_closure_range(name, law, float(stress))
     print("the scene is valid")
+
+
+def _check_stages_in_space(scene: SpaceScene) -> None:
+    """Print the verdict after each excavation stage, on joints without history."""
+    for number in range(1, len(scene.stages) + 1):
+        print(f"after excavation stage {number}, on joints without history:")
+        _print_verdict_in_space(Statics(scene.after_stages(number)))
 
 
 def _check_water_tables_in_space(scene: SpaceScene) -> None:

@@ -14,6 +14,7 @@ contact manager keeps it as a negative closure offset.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -113,19 +114,34 @@ def create_joints(
     if scene.in_situ is None or not joints.n:
         return np.zeros((joints.n, 1))
     contacts = manager.contacts
-    skin = scene.skins.min()
     stress = _in_situ_stress(scene, contacts)
-    is_apart = contacts.closure < -MAX_DRAWN_GAP * skin
-    stress[is_apart | (contacts.length < MIN_LENGTH) | (stress[:, 0] <= 0)] = 0.0
-    closure, sliding = np.hsplit(_displacement_at_stress(joints, stress), [1])
-    closure = closure[:, 0]
-    if closure.max() > skin:
+    stress[contacts.length < MIN_LENGTH] = 0.0
+    skin = float(scene.skins.min())
+    manager.closure_offset, sliding = start_under_stress(joints, stress, contacts.closure, skin)
+    return sliding
+
+
+def start_under_stress(
+    joints: Any, stress: np.ndarray, closure: np.ndarray, skin: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return closure offsets (k,) and sliding (k, dim - 1) in m with which virgin joints start, so
+    that they bear a stress (k, dim) in Pa.
+
+    closure (k,): as drawn, in m; joints that are drawn open bear no stress, nor do joints under
+    tension. skin (m): the least range of contact detection.
+
+    Raises ValueError for a stress that closes joints farther than contacts are followed.
+    """
+    is_apart = closure < -MAX_DRAWN_GAP * skin
+    stress = np.where((is_apart | (stress[:, 0] <= 0))[:, None], 0.0, stress)
+    start, sliding = np.hsplit(displacement_at_stress(joints, stress), [1])
+    start = start[:, 0]
+    if start.max(initial=0.0) > skin:
         raise ValueError(
-            f"in_situ closes joints by up to {closure.max():.3g} m, but contacts are followed to "
+            f"in_situ closes joints by up to {start.max():.3g} m, but contacts are followed to "
             f"{skin:.3g} m: set a larger run.skin, or stiffer laws"
         )
-    manager.closure_offset = np.where(closure > 0, contacts.closure - closure, 0.0)
-    return sliding
+    return np.where(start > 0, closure - start, 0.0), sliding
 
 
 def _in_situ_stress(scene: Scene, contacts: Contacts) -> np.ndarray:
@@ -147,16 +163,20 @@ def _in_situ_stress(scene: Scene, contacts: Contacts) -> np.ndarray:
     return np.stack([on_joint.real, on_joint.imag], axis=1)
 
 
-def _displacement_at_stress(joints: Joints, stress: np.ndarray) -> np.ndarray:
-    """Closure and sliding (k, 2) in m at which virgin joints bear normal and shear stress (k, 2).
+def displacement_at_stress(joints: Any, stress: np.ndarray) -> np.ndarray:
+    """Closure and sliding (k, dim) in m at which virgin joints bear a stress (k, dim) in Pa.
+
+    joints: `contact.Joints`, or others with `trial` and `interpolate`. stress: normal stress, then
+    shear stresses, one in the plane and two in space.
 
     Newton's method. A joint that cannot bear the shear stress keeps the first step, with which it
     bears as much as it can.
     """
     closure = joints.interpolate("closure", "stress", stress[:, 0])
-    d = np.stack([closure, np.zeros(joints.n)], axis=1)
+    d = np.zeros_like(stress)
+    d[:, 0] = closure
     first_step = d
-    min_slope = np.full(joints.n, 1e-300)
+    min_slope = np.full(len(d), 1e-300)
     for trial in range(1, MAX_TRIALS + 1):
         F, C, _ = joints.trial(d)
         missing = stress - F
@@ -164,18 +184,37 @@ def _displacement_at_stress(joints: Joints, stress: np.ndarray) -> np.ndarray:
         if converged.all() or trial == MAX_TRIALS:
             break
         normal_stiffness = np.maximum(C[:, 0, 0], 1e-300)
-        # slope of the shear stress at constant normal stress
-        slope = C[:, 1, 1] - C[:, 1, 0] * C[:, 0, 1] / normal_stiffness
-        min_slope = np.maximum(min_slope, MIN_SLOPE * slope)
-        coupled = C[:, 1, 0] / normal_stiffness * missing[:, 0]
-        shear_step = (missing[:, 1] - coupled) / np.maximum(slope, min_slope)
+        # slope of the shear stresses at constant normal stress
+        coupling = C[:, 1:, 0] / normal_stiffness[:, None]
+        slope = C[:, 1:, 1:] - coupling[:, :, None] * C[:, :1, 1:]
+        min_slope = np.maximum(min_slope, MIN_SLOPE * _largest_slope(slope))
+        coupled = coupling * missing[:, :1]
+        shear_step = _divide_by_slope(missing[:, 1:] - coupled, slope, min_slope)
         shear_step[converged] = 0.0
-        closure_step = (missing[:, 0] - C[:, 0, 1] * shear_step) / normal_stiffness
+        by_shear = np.einsum("kj,kj->k", C[:, 0, 1:], shear_step)
+        closure_step = (missing[:, 0] - by_shear) / normal_stiffness
         closure = np.maximum(d[:, 0] + closure_step, 0.1 * d[:, 0])
-        d = np.stack([closure, d[:, 1] + shear_step], axis=1)
+        d = np.column_stack([closure, d[:, 1:] + shear_step])
         if trial == 1:
             first_step = d
     return np.where(converged[:, None], d, first_step)
+
+
+def _largest_slope(slope: np.ndarray) -> np.ndarray:
+    """Largest stiffness (k,) of shear in any direction, from slopes (k, m, m)."""
+    return np.linalg.eigvalsh(slope + np.swapaxes(slope, 1, 2))[:, -1] / 2
+
+
+def _divide_by_slope(stress: np.ndarray, slope: np.ndarray, min_slope: np.ndarray) -> np.ndarray:
+    """Shears (k, m) in m that give stresses (k, m) at slopes (k, m, m), none of them less than
+    `min_slope` (k,) in any direction."""
+    value, vector = np.linalg.eigh((slope + np.swapaxes(slope, 1, 2)) / 2)
+    is_steep = value[:, 0] >= min_slope
+    components = np.einsum("kji,kj->ki", vector, stress) / np.maximum(value, min_slope[:, None])
+    shears = np.einsum("kij,kj->ki", vector, components)
+    if is_steep.any():
+        shears[is_steep] = np.linalg.solve(slope[is_steep], stress[is_steep, :, None])[:, :, 0]
+    return shears
 
 
 def settle(

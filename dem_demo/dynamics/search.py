@@ -17,6 +17,7 @@ the unstable blocks creep from their places as far as it takes to release those 
 A search without a decision counts as no equilibrium, and is reported (`Verdict.NOT_DECIDED`).
 """
 
+from collections.abc import Callable
 from functools import partial, reduce
 from typing import Any, NamedTuple
 
@@ -303,6 +304,19 @@ class EquilibriumSearch:
         y, _, _ = self._step(self.zero, drag, STEP_TOLERANCE, can_slide=False)
         return y
 
+    def _reference_force(self, norms: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Sizes of the loads of islands, to which residuals are relative.
+
+        Without loads, of the forces of the joints at the start, as under in-situ stress alone.
+        norms: of values (m,) in each island.
+        """
+        loads = norms(self.force)
+        if loads.all():
+            return loads
+        F = self.joints.trial(self.start.reshape(self.dim, -1).T)[0]
+        joint_forces = abs(self.kinematics).T @ (self.area * np.abs(F.T.ravel()))
+        return np.where(loads > 0, loads, norms(joint_forces))
+
     def unbalanced_force(self, y: np.ndarray) -> np.ndarray:
         """Unbalanced forces and moments (n, dof) in N and N m at displacements y (m,)."""
         return self.expand(self._unbalanced(y)[0] / self.root)
@@ -349,7 +363,7 @@ class EquilibriumSearch:
             return unbalanced, C, residual, norms(residual)
 
         unbalanced, C, residual, size = evaluate(y)
-        target = tolerance * norms(self.force)
+        target = tolerance * self._reference_force(norms)
         damping = 0.0 * target
         is_active = size > target
         for _ in range(max_iterations):

@@ -7,6 +7,10 @@ given order, so the joints of a later set may end at joints of an earlier one.
 Pieces narrower than the smallest width are slivers. A sliver is merged with a neighbour with which
 it forms a convex block, across a joint of the last set if possible. A sliver that no neighbour can
 take is left out.
+
+Before all sets, the rock is cut along the faces of regions that are excavated later. As blocks are
+convex, these cuts go on beyond the region, where they separate intact rock (`excavation_cuts`). No
+piece is merged across the outline of a region.
 """
 
 from collections.abc import Sequence
@@ -19,7 +23,7 @@ import numpy as np
 from jointlaw.support.progress import track
 
 from ..scene.cutting import joint_offsets
-from .solids import LENGTH_TOLERANCE, OUTLINE, Solid, convex_hull
+from .solids import EXCAVATION, LENGTH_TOLERANCE, OUTLINE, Solid, convex_hull
 
 MERGE_TOLERANCE = 1e-6  # of the volume that a convex hull may add to two merged pieces
 
@@ -112,21 +116,30 @@ def estimate_block_count(rock: Solid, sets: Sequence[PlaneSet]) -> float:
     return 1.0 + joints + lines + points
 
 
-def cut_rock(rock: Solid, sets: Sequence[PlaneSet], seed: int, min_width: float) -> Pieces:
+def cut_rock(
+    rock: Solid,
+    sets: Sequence[PlaneSet],
+    seed: int,
+    min_width: float,
+    regions: Sequence[Solid] = (),
+) -> Pieces:
     """Cut a convex rock into convex blocks no narrower than `min_width` (m).
 
-    seed: of the random spacing and persistence. The rock is cut in coordinates relative to its
-    first vertex, so a distant rock loses no digits.
+    seed: of the random spacing and persistence. regions: that are excavated later. The rock is cut
+    in coordinates relative to its first vertex, so a distant rock loses no digits.
     """
     origin = rock.vertices[0]
     tolerance = LENGTH_TOLERANCE * rock.size
     pieces = [rock.moved(-origin)]
+    regions = [region.moved(-origin) for region in regions]
+    for region in regions:
+        pieces = [part for piece in pieces for part in _cut_along(piece, region, tolerance)]
     for number, joints in enumerate(sets):
         rng = np.random.default_rng([seed, number])
         shift = float(joints.normal @ origin)
         for offset in track(joints.offsets(rock.vertices, rng), f"cutting, set {number + 1}"):
             pieces = _cut_pieces(pieces, joints, number, offset - shift, tolerance, rng)
-    pieces, merged, dropped = _merge_slivers(pieces, min_width, tolerance)
+    pieces, merged, dropped = _merge_slivers(pieces, min_width, tolerance, regions)
     pieces.sort(key=lambda piece: tuple(np.round(piece.centroid[::-1] / tolerance).tolist()))
     return Pieces(
         [piece.moved(origin) for piece in pieces], merged, [d.moved(origin) for d in dropped]
@@ -151,10 +164,69 @@ def _cut_pieces(pieces: list[Solid], joints: PlaneSet, number, offset, tolerance
     return parts
 
 
+def _cut_along(piece: Solid, region: Solid, tolerance: float) -> list[Solid]:
+    """Parts of a piece outside and inside a region, all of them convex."""
+    parts: list[Solid] = []
+    cuts = list(zip(region.faces, region.face_normals, strict=True))
+    heights = [piece.vertices @ n - region.vertices[face[0]] @ n for face, n in cuts]
+    if any(height.min() > -tolerance for height in heights):
+        return [piece]  # beside the region
+    inside: Solid | None = piece
+    for face, normal in cuts:
+        offset = float(normal @ region.vertices[face[0]])
+        inside, outside = inside.split(normal, offset, EXCAVATION, tolerance)
+        if outside is not None:
+            parts.append(outside)
+        if inside is None:  # in the corner between two faces of the region
+            return [piece]
+    return [*parts, inside]
+
+
+def _regions_of(piece: Solid, regions: Sequence[Solid]) -> tuple[bool, ...]:
+    """Whether a piece lies in each of the regions along which it was cut."""
+    return tuple(region.contains(piece.centroid) for region in regions)
+
+
+def excavation_cuts(pieces: Sequence[Solid], regions: Sequence[Solid]) -> list[tuple[int, int]]:
+    """Pairs of pieces that only a cut along the faces of a region separates, not its outline.
+
+    Both lie outside all the same regions, or inside them. A pair may be listed whose faces lie in
+    one plane and do not touch.
+    """
+    cut = [i for i, piece in enumerate(pieces) if EXCAVATION in piece.face_sets]
+    inside = {i: _regions_of(pieces[i], regions) for i in cut}
+    pairs = []
+    for i, j in combinations(cut, 2):
+        one, other = pieces[i], pieces[j]
+        tolerance = 10 * LENGTH_TOLERANCE * max(one.size, other.size)
+        low = np.maximum(one.vertices.min(axis=0), other.vertices.min(axis=0))
+        high = np.minimum(one.vertices.max(axis=0), other.vertices.max(axis=0))
+        if inside[i] == inside[j] and (low < high + tolerance).all():
+            numbers = {one.face_sets[k] for k in _faces_on(one, other, tolerance)}
+            if EXCAVATION in numbers:
+                pairs.append((i, j))
+    return pairs
+
+
+def _faces_on(one: Solid, other: Solid, tolerance: float) -> list[int]:
+    """Numbers of the faces of one solid that lie in the plane of a face of another, opposite to
+    it."""
+    cosine = one.face_normals @ other.face_normals.T
+    start = other.vertices[[face[0] for face in other.faces]]
+    faces = []
+    for i, face in enumerate(one.faces):
+        gap = np.abs((one.vertices[face[0]] - start) @ one.face_normals[i])
+        if ((cosine[i] < -1 + LENGTH_TOLERANCE) & (gap < tolerance)).any():
+            faces.append(i)
+    return faces
+
+
 def _merge_slivers(
-    pieces: list[Solid], min_width: float, tolerance: float
+    pieces: list[Solid], min_width: float, tolerance: float, regions: Sequence[Solid] = ()
 ) -> tuple[list[Solid], int, list[Solid]]:
     """Merge or leave out pieces narrower than `min_width` (m), the narrowest first.
+
+    No piece is merged with one that lies in other regions.
 
     Returns pieces, number of merged slivers, slivers left out.
     """
@@ -164,6 +236,8 @@ def _merge_slivers(
         sliver = min(pieces, key=lambda piece: piece.width)
         pieces = [piece for piece in pieces if piece is not sliver]
         for neighbour in _neighbours(sliver, pieces, tolerance):
+            if _regions_of(sliver, regions) != _regions_of(neighbour, regions):
+                continue
             union = _convex_union(sliver, neighbour, tolerance)
             if union is not None:
                 pieces = [union if piece is neighbour else piece for piece in pieces]
@@ -182,13 +256,9 @@ def _neighbours(sliver: Solid, pieces: list[Solid], tolerance: float) -> list[So
     for i, piece in enumerate(pieces):
         if (piece.vertices.max(axis=0) < low).any() or (piece.vertices.min(axis=0) > high).any():
             continue
-        cosine = sliver.face_normals @ piece.face_normals.T
-        start = piece.vertices[[face[0] for face in piece.faces]]
-        for j, (face, number) in enumerate(zip(sliver.faces, sliver.face_sets, strict=True)):
-            gap = np.abs((sliver.vertices[face[0]] - start) @ sliver.face_normals[j])
-            is_common = (cosine[j] < -1 + LENGTH_TOLERANCE) & (gap < 10 * tolerance)
-            if number != OUTLINE and is_common.any():
-                ranked.append((number, float(sliver.face_areas[j]), i))
+        for j in _faces_on(sliver, piece, 10 * tolerance):
+            if sliver.face_sets[j] != OUTLINE:
+                ranked.append((sliver.face_sets[j], float(sliver.face_areas[j]), i))
     return [pieces[i] for *_, i in sorted(ranked, reverse=True)]
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw.support.checks import integer, number
+from jointlaw.support.checks import integer, number, one_of
 
 from ..scene.keys import (
     DENSITY,
@@ -143,8 +143,16 @@ SCENE = {
     "water": {
         "table!": level, "unit_weight": POSITIVE, "at": [{"time!": POSITIVE, "table!": level}],
     },
+    "in_situ": {
+        "k0": horizontal_ratios, "stress": stress_components, "surface": level,
+        **dict.fromkeys(SIDES, partial(one_of, choices=("fixed", "rollers", "loaded"))),
+    },
+    "excavate": [{
+        "box": positive_vector, "at": vector, "corners": points, "start": NOT_NEGATIVE,
+        "release_time!": POSITIVE,
+    }],
     **dict.fromkeys(
-        ("in_situ", "excavate", "drive", "monitor", "thickness", "bolt", "pressure"),
+        ("drive", "monitor", "thickness", "bolt", "pressure"),
         not_there_yet,
     ),
 }  # fmt: skip

@@ -1,7 +1,7 @@
 """Read scenes in space from TOML files or text, and validate them."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,9 @@ from jointlaw.support.checks import one_of
 from ..scene import Files, Scene, Tables, build_law, read_tables
 from ..scene import build as build_in_plane
 from ..scene.keys import NOT_NEGATIVE, some_of
+from ..scene.laws import INTACT_ROCK, intact_rock_law
 from ..scene.read import (
+    INTACT_OPENING_PER_SKIN,
     MAX_BLOCKS,
     MIN_WIDTH_PER_SPACING,
     WATER_UNIT_WEIGHT,
@@ -23,18 +25,18 @@ from ..scene.read import (
     read_source,
     read_water_changes,
 )
-from .cutting import PlaneSet, cut_rock, estimate_block_count, plane_normal
-from .keys import SCENE
+from .cutting import PlaneSet, cut_rock, estimate_block_count, excavation_cuts, plane_normal
+from .keys import SCENE, SIDES
 from .loads import SpaceStress
 from .meshes import read_solid
 from .scene import MAX_OVERLAP, SpaceBlock, SpaceRock, SpaceScene, is_anisotropic
-from .solids import OUTLINE, Solid, box, convex_solid
+from .solids import LENGTH_TOLERANCE, Solid, box, convex_solid
 
 SHAPES = "box", "corners", "file"
 REGIONS = "box", "corners", "dip"
 DEFAULTS: Tables = {
     "gravity": np.array([0.0, 0.0, -9.81]), "seismic": np.zeros(3), "density": 2600.0, "run": {},
-    **dict.fromkeys(("block", "rock", "joint"), ()),
+    **dict.fromkeys(("block", "rock", "joint", "excavate"), ()),
 }  # fmt: skip
 
 
@@ -84,18 +86,31 @@ def build(
             f"{where}: seismic = {top['seismic'].tolist()}: shares of the weight, which is zero "
             "without gravity; give gravity, or leave seismic out"
         )
+    regions = [
+        _shape(table, f"{where}: excavate[{i}]", files, ("box", "corners"))
+        for i, table in enumerate(top["excavate"])
+    ]
     blocks = [_block(table, top["density"], where, files) for table in top["block"]]
-    rocks = [_rock(table, blocks, top, laws, where, files) for table in top["rock"]]
+    rocks = [_rock(table, blocks, regions, top, laws, where, files) for table in top["rock"]]
+    water, in_situ = _stresses(top, blocks, where)
     number = _require_names(blocks, rocks, where)
     pairs = _pairs(top["joint"], number, laws, where)
-    water = _stresses(top, blocks, where)
+    stages = tuple(_stages(regions, top["excavate"], blocks, where))
+    for pair in (pair for rock in rocks for pair in rock.intact_pairs):
+        pairs.setdefault(pair, (INTACT_ROCK, 0.0))
     scene = SpaceScene(
         top.get("title", where), tuple(blocks), laws, default, top.get("rough", 0.0), pairs,
-        tuple(rocks), top["gravity"], top["seismic"], skin=top["run"].get("skin"),
-        max_overlap=top["run"].get("max_overlap", MAX_OVERLAP), water=water, pressure=pressure,
+        tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
+        top["gravity"], top["seismic"], skin=top["run"].get("skin"),
+        max_overlap=top["run"].get("max_overlap", MAX_OVERLAP), water=water, in_situ=in_situ,
+        pressure=pressure, stages=stages,
         water_changes=read_water_changes(top.get("water", {}), where),
     )  # fmt: skip
     _require_rough(scene, "rough" in top, where)
+    if any(name == INTACT_ROCK for name, _ in pairs.values()):
+        opening = INTACT_OPENING_PER_SKIN * float(scene.skins.min())
+        intact = intact_rock_law(list(laws.values()), opening)
+        laws.setdefault(INTACT_ROCK, replace(intact, plane=None))
     for name, value in (("files", files), ("text", text)):  # not copied by `replace`
         object.__setattr__(scene, name, value)
     return scene
@@ -140,10 +155,13 @@ def _block(table: Tables, density: float, where: str, files: Files) -> SpaceBloc
 
 
 def _rock(
-    table: Tables, blocks: list[SpaceBlock], top: Tables, laws: dict[str, jl.Law], where: str,
-    files: Files,
+    table: Tables, blocks: list[SpaceBlock], regions: list[Solid], top: Tables,
+    laws: dict[str, jl.Law], where: str, files: Files,
 ) -> SpaceRock:  # fmt: skip
-    """Cut a rock mass; its blocks are appended to `blocks`. top: tables of the scene, for defaults.
+    """Cut a rock mass; its blocks are appended to `blocks`.
+
+    regions: that are excavated later, along whose faces the rock is cut. top: tables of the scene,
+    for defaults. The list of movable blocks is left empty.
 
     Raises ValueError.
     """
@@ -171,21 +189,21 @@ def _rock(
     extent = float(np.ptp(solid.vertices, axis=0).min())
     spacing = min([extent, *(one.spacing for one in sets)])
     min_width = table.get("min_width", MIN_WIDTH_PER_SPACING * spacing * bool(sets))
-    pieces = cut_rock(solid, sets, table.get("seed", 0), min_width)
+    pieces = cut_rock(solid, sets, table.get("seed", 0), min_width, regions)
     if not pieces.solids:
         raise ValueError(
             f"{where}: all blocks would be slivers: give a min_width below {min_width:.3g} m"
         )
-    regions = [
+    fixed_regions = [
         _Region(part, f"{where}.fixed[{i}]", files) for i, part in enumerate(table.get("fixed", ()))
     ]
     first = len(blocks)
     density = table.get("density", top["density"])
     for i, piece in enumerate(pieces.solids):
-        fixed = any(region.contains(piece.centroid) for region in regions)
-        face_laws = tuple(None if n == OUTLINE else sets[n].law for n in piece.face_sets)
+        fixed = any(region.contains(piece.centroid) for region in fixed_regions)
+        face_laws = tuple(None if n < 0 else sets[n].law for n in piece.face_sets)
         axes = np.array(
-            [np.zeros(3) if n == OUTLINE else sets[n].rough_direction for n in piece.face_sets]
+            [np.zeros(3) if n < 0 else sets[n].rough_direction for n in piece.face_sets]
         )
         blocks.append(
             SpaceBlock(
@@ -198,8 +216,31 @@ def _rock(
         messages.append(
             f"a gap of {sliver.volume:.2g} m3 at ({x:.3g}, {y:.3g}, {z:.3g}), a sliver left out"
         )
-    numbers = range(first, len(blocks))
-    return SpaceRock(name, numbers, [i for i in numbers if not blocks[i].fixed], messages)
+    intact_pairs = [
+        frozenset((first + i, first + j)) for i, j in excavation_cuts(pieces.solids, regions)
+    ]
+    if intact_pairs:
+        messages.append(
+            f"cuts at an excavation that are no joints: {len(intact_pairs)}, intact rock"
+        )
+    return SpaceRock(name, range(first, len(blocks)), [], messages, intact_pairs)
+
+
+def _stages(
+    regions: list[Solid], tables: Iterable[Tables], blocks: list[SpaceBlock], where: str
+) -> Iterator[Tables]:
+    """Yield excavation stages; each removes the blocks whose centroids lie in its region.
+
+    Raises ValueError.
+    """
+    remaining = {i: block.centroid for i, block in enumerate(blocks)}
+    for i, (region, table) in enumerate(zip(regions, tables, strict=True)):
+        removed = [j for j, centroid in remaining.items() if region.contains(centroid)]
+        if not removed:
+            raise ValueError(f"{where}: excavate[{i}]: no block is left there; move its region")
+        for j in removed:
+            del remaining[j]
+        yield {"start": None, **table, "blocks": removed}
 
 
 class _Region:
@@ -227,20 +268,72 @@ class _Region:
         return bool((point - self.through) @ self.normal < 0)
 
 
-def _stresses(top: Tables, blocks: list[SpaceBlock], where: str) -> SpaceStress | None:
-    """Build the stress of the table `[water]` of a scene. Raises ValueError."""
+def _stresses(
+    top: Tables, blocks: list[SpaceBlock], where: str
+) -> tuple[SpaceStress | None, SpaceStress | None]:
+    """Build the stresses of the tables `[water]` and `[in_situ]` of a scene.
+
+    blocks: blocks on the sides are fixed or get rollers as `[in_situ]` says. Faces that the in-situ
+    stress loads from outside carry no water pressure, because that stress is the total one.
+
+    Raises ValueError.
+    """
     water = top.get("water")
+    table = top.get("in_situ", {})
     gravity = top["gravity"]
-    if water and (gravity[:2].any() or gravity[2] > 0):
+    if "in_situ" in top and ("k0" in table) == ("stress" in table):
+        raise ValueError(
+            f"{where}: in_situ: give either k0 or stress = [sxx, syy, szz, sxy, syz, szx]"
+        )
+    if (water or "k0" in table) and (gravity[:2].any() or gravity[2] > 0):
         raise ValueError(
             f"{where}: gravity = {gravity.tolist()} must point down, [0, 0, -9.81], for a water "
-            "table"
+            "table and for k0"
         )
-    if not water:
-        return None
-    faces = sum(len(block.solid.faces) for block in blocks)
-    unit_weight = water.get("unit_weight", WATER_UNIT_WEIGHT)
-    return SpaceStress(np.eye(3), water["table"], unit_weight, 0.0, np.ones(faces, bool))
+    loaded = _apply_sides(table, blocks)
+    if water:
+        unit_weight = water.get("unit_weight", WATER_UNIT_WEIGHT)
+        water = SpaceStress(np.eye(3), water["table"], unit_weight, 0.0, ~loaded)
+    if not table:
+        return water, None
+    highest = max(float(block.solid.vertices[:, 2].max()) for block in blocks)
+    surface = table.get("surface", np.array([highest, 0.0, 0.0]))
+    if "stress" in table:
+        return water, SpaceStress(table["stress"], surface, 0.0, 1.0, loaded)
+    weight = -top["density"] * gravity[2]
+    return water, SpaceStress(np.diag([*table["k0"], 1.0]), surface, weight, 0.0, loaded)
+
+
+def _apply_sides(table: Tables, blocks: list[SpaceBlock]) -> np.ndarray:
+    """Fix the blocks on the sides of a scene as `[in_situ]` says.
+
+    Returns whether each face (f,) of all blocks in order is loaded from outside.
+    """
+    vertices = np.concatenate([block.solid.vertices for block in blocks])
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    tolerance = LENGTH_TOLERANCE * float((high - low).max())
+    loaded: list[bool] = []
+    for i, block in enumerate(blocks):
+        solid = block.solid
+        sides = [
+            {
+                side
+                for side, (axis, sign) in SIDES.items()
+                if abs(solid.vertices[list(face), axis] - (high if sign > 0 else low)[axis]).max()
+                < tolerance
+            }
+            for face in solid.faces
+        ]
+        loaded += [any(table.get(side) == "loaded" for side in on_face) for on_face in sides]
+        fixed = block.fixed
+        motions = {*block.prescribed}
+        for side in set().union(*sides):
+            fixed |= table.get(side) == "fixed"
+            if table.get(side) == "rollers":
+                motions |= {"xyz"[SIDES[side][0]], "turn"}
+        prescribed = () if fixed else tuple(sorted(motions))
+        blocks[i] = replace(block, fixed=fixed, prescribed=prescribed)
+    return np.array(loaded, bool)
 
 
 def _require_names(blocks: list[SpaceBlock], rocks: list[SpaceRock], where: str) -> dict[str, int]:

@@ -57,13 +57,15 @@ class SpaceRock:
     """A rock mass of a scene, cut into blocks.
 
     blocks: their numbers in the scene; free: numbers of the blocks that can move; messages: what
-    was done with slivers, one line each.
+    was done with slivers, one line each. intact_pairs: pairs of blocks that only a cut at an
+    excavation separates, which is no joint.
     """
 
     name: str
     blocks: range
     free: list[int]
     messages: list[str]
+    intact_pairs: list[frozenset] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)

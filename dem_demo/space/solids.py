@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull, QhullError
 LENGTH_TOLERANCE = 1e-7  # of the size of a solid: shorter distances count as zero
 COPLANAR_TOLERANCE = 1e-7  # of unit normals of facets that belong to one face
 MAX_FLATNESS = 1e-9  # thickness over length of points that span no volume
+EXCAVATION = -2  # in place of the number of a set: cuts along an excavation are no joints
 OUTLINE = -1  # in place of the number of a set: faces of the outline are no joints
 
 

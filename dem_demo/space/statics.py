@@ -16,10 +16,11 @@ import jointlaw as jl
 
 from ..contact import tabulate_first_loading
 from ..contact.joints import stick_response
-from ..dynamics.equilibrium import MIN_FORCE_SCALE, STANDARD_GRAVITY
+from ..dynamics.equilibrium import MIN_FORCE_SCALE, STANDARD_GRAVITY, start_under_stress
 from ..dynamics.relaxation import Verdict
 from ..dynamics.search import EquilibriumSearch, StaticSystem
 from .contacts import Surfaces, contact_axes, contact_rows, find_contacts, turned_from_dip
+from .in_situ import in_situ_traction
 from .loads import applied_loads
 from .scene import SpaceScene
 
@@ -107,7 +108,9 @@ class Statics:
     surfaces, points, axes, rows: geometry of the contacts (`contacts.py`); law (k,): numbers of the
     laws. mass (n,) in kg; gravity (n, 6) in N: with the pseudo-static seismic forces; loads (n, 6):
     all other forces and moments (`applied_loads`). is_free_motion (n, 6): motions that forces move;
-    is_free (n,): blocks with such motions; is_removed (n,): blocks that are absent.
+    is_free (n,): blocks with such motions; is_removed (n,): blocks that are absent. start (k, 3) in
+    m: closure and shears with which the joints start; the closure is the drawn one, or with in-situ
+    stress the one at which they bear it.
 
     Raises ValueError for blocks that overlap as drawn.
     """
@@ -131,6 +134,16 @@ class Statics:
         self.gravity = np.zeros((len(blocks), 6))
         self.gravity[:, :3] = self.mass[:, None] * scene.acceleration
         self.loads = applied_loads(scene, self.surfaces, self.rows, self.law)
+
+        self.start = np.zeros((len(self.rows.area), 3))
+        self.start[:, 0] = self.rows.closure
+        if scene.in_situ is not None:
+            joints = VirginJoints(scene.laws.values(), self.law, scene.reduction)
+            stress = in_situ_traction(scene, self.points, self.axes)
+            skin = float(scene.skins.min())
+            offset, shears = start_under_stress(joints, stress, self.rows.closure, skin)
+            self.start[:, 0] -= offset
+            self.start[:, 1:] = shears
 
     def _require_apart(self) -> None:
         """Require that no blocks overlap by more than their skins. Raises ValueError."""
@@ -199,8 +212,6 @@ class Statics:
         scene = scene or self.scene
         rows = self.rows
         joints = VirginJoints(scene.laws.values(), self.law, scene.reduction)
-        start = np.zeros((len(rows.area), 3))
-        start[:, 0] = rows.closure
         of_blocks = np.concatenate([self.scale[rows.block_a], self.scale[rows.block_b]], axis=1)
         area = rows.area
         if excluded is not None:
@@ -216,7 +227,7 @@ class Statics:
                 rows.block_b,
                 rows.kinematics * of_blocks[:, None],
                 area,
-                start,
+                self.start,
                 joints,
             )
         )
@@ -226,7 +237,8 @@ class Statics:
         none."""
         search = self.search(scene)
         none = np.zeros(len(self.mass), bool)
-        solution = search.solve(search.stick_predictor(), none)
+        guess = search.stick_predictor() if self.scene.in_situ is None else search.zero
+        solution = search.solve(guess, none)
         verdict = solution.verdict
         if verdict is Verdict.EQUILIBRIUM and solution.unstable.any():
             verdict = Verdict.NO_EQUILIBRIUM

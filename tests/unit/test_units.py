@@ -1,0 +1,110 @@
+"""Every table of units against the constants of scipy, from which each unit is composed anew."""
+
+import re
+
+import pytest
+from scipy import constants
+
+from dem_demo.scene import drives
+from jointlaw.calibration import comparison, tables
+from jointlaw.laboratory import record
+from jointlaw.support import units
+
+PREFIXES = {
+    "n": constants.nano, "u": constants.micro, "µ": constants.micro, "μ": constants.micro,
+    "m": constants.milli, "c": constants.centi, "d": constants.deci, "da": constants.deka,
+    "k": constants.kilo, "M": constants.mega, "G": constants.giga,
+}  # fmt: skip
+NAMES = {  # value in SI units
+    "1": 1.0, "m": 1.0, "N": 1.0, "Pa": 1.0, "s": 1.0, "J": 1.0, "Pas": 1.0,
+    "rad": 1.0, "deg": constants.degree, "°": constants.degree, "min": constants.minute,
+    "l": constants.liter, "bar": constants.bar, "atm": constants.atm, "g": constants.g,
+    "gal": constants.centi,  # named after Galilei: 1 cm/s2
+    "in": constants.inch, "inch": constants.inch, "inches": constants.inch, '"': constants.inch,
+    "ft": constants.foot, "mil": constants.mil, "mils": constants.mil, "thou": constants.mil,
+    "psi": constants.psi, "ksi": constants.kilo * constants.psi,
+    "psf": constants.lbf / constants.foot**2,
+    "tsf": constants.short_ton * constants.g / constants.foot**2,
+    "lbf": constants.lbf, "lb": constants.lbf, "lbs": constants.lbf,
+    "kip": constants.kilo * constants.lbf, "kips": constants.kilo * constants.lbf,
+    "kgf": constants.kgf, "kp": constants.kgf, "kg": constants.kgf,
+    "tf": constants.kilo * constants.kgf, "t": constants.kilo * constants.kgf,
+    "at": constants.kgf / constants.centi**2,  # technical atmosphere
+}  # fmt: skip
+
+
+def value_of(unit):
+    """Value of a unit in SI units: quotients, digits as exponents, prefixes."""
+    above, _, below = unit.rpartition("/")
+    if above:
+        return value_of(above) / value_of(below)
+    name, exponent = re.fullmatch(r"(.*?)([23]?)", unit).groups()
+    if name not in NAMES:
+        prefix = next(one for one in ("da", *PREFIXES) if name[len(one) :] in NAMES
+                      and name.startswith(one))  # fmt: skip
+        return (PREFIXES[prefix] * NAMES[name.removeprefix(prefix)]) ** int(exponent or 1)
+    return NAMES[name] ** int(exponent or 1)
+
+
+@pytest.mark.parametrize(
+    ("si_unit", "unit"), [(si, unit) for si, table in units._FACTORS.items() for unit in table]
+)
+def test_units_of_commands_and_files(si_unit, unit):
+    assert value_of(si_unit) == 1.0
+    assert units.parse(f"1{unit}", si_unit) == pytest.approx(value_of(unit), rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", units.OTHER_UNITS)
+def test_remedies_for_other_units_are_as_large(unit):
+    """To seven digits, as they are written."""
+    remedy = units.OTHER_UNITS[unit]
+    number, in_unit = re.fullmatch(r"([\d.]+)(\D.*)", remedy).groups()
+    assert float(number) * value_of(in_unit) == pytest.approx(value_of(unit), rel=2e-7)
+
+
+@pytest.mark.parametrize("unit", drives.UNITS)
+def test_units_of_records_of_motion(unit):
+    """The order is the power of time below the length; g and gal are accelerations."""
+    order, factor = drives.UNITS[unit]
+    assert factor == pytest.approx(value_of(unit), rel=1e-15)
+    of_name = {"": 0, "s": 1, "s2": 2}[unit.partition("/")[2]]
+    assert order == (2 if unit in ("g", "gal") else of_name)
+
+
+@pytest.mark.parametrize("quantity", comparison.UNITS)
+def test_units_of_comparisons(quantity):
+    unit, factor = comparison.UNITS[quantity]
+    assert factor == pytest.approx(1 / value_of(unit), rel=1e-15)
+    assert unit == ("mm" if quantity == "opening" else "MPa")
+
+
+@pytest.mark.parametrize("prefix", record._SI_PREFIXES)
+def test_prefixes_of_figures(prefix):
+    assert record._SI_PREFIXES[prefix] == value_of(f"{prefix}m")
+
+
+@pytest.mark.parametrize("spelling", tables._SPELLINGS)
+def test_spellings_of_units(spelling):
+    """Capitals, and Cyrillic letters, by their sound."""
+    latin = spelling.translate(str.maketrans("мксМПаНн", "mksMPaNn"))
+    meant = {"mkm": "um", "sm": "cm"}.get(latin, latin)
+    assert tables._SPELLINGS[spelling].lower() == meant.lower()
+    assert value_of(tables._SPELLINGS[spelling]) > 0
+
+
+@pytest.mark.parametrize("unit", units.COMMON.items())
+def test_examples_of_units_belong_to_the_si_unit(unit):
+    si_unit, common = unit
+    assert units.parse(f"1{common}", si_unit) == pytest.approx(value_of(common), rel=1e-12)
+
+
+def test_units_of_the_columns_of_a_laboratory_test():
+    """Lengths, stresses, fractions and energies by their meaning."""
+    lengths = ("closure", "shear_2", "shear_3")
+    expected = {
+        **dict.fromkeys(lengths, "m"),
+        **dict.fromkeys(("F1", "F2", "F3"), "Pa"),
+        **dict.fromkeys(("sliding", "separated"), "1"),
+        **dict.fromkeys(("stored", "dissipated"), "J/m2"),
+    }
+    assert [*record.UNITS.items()] == [*expected.items()]

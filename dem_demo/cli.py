@@ -263,8 +263,14 @@ def _check_in_space(scene: SpaceScene) -> None:
 
 def _check_stages_in_space(scene: SpaceScene) -> None:
     """Print the verdict after each excavation stage, on joints without history."""
-    for number in range(1, len(scene.stages) + 1):
-        print(f"after excavation stage {number}, on joints without history:")
+    for number, stage in enumerate(scene.stages, 1):
+        count = len(stage["blocks"])
+        blocks = "1 block" if count == 1 else f"{count} blocks"
+        begin = "at rest" if stage["start"] is None else f"at {stage['start']:g} s"
+        print(
+            f"after excavation stage {number} (it begins {begin}, removes {blocks} and releases "
+            f"their forces in {stage['release_time']:g} s), on joints without history:"
+        )
         _print_verdict_in_space(Statics(scene.after_stages(number)))
 
 

@@ -89,6 +89,36 @@ JOINTED = TURNED | {
 }
 
 
+IN_SITU = {
+    "laws": LAWS,
+    "rock": [
+        {
+            "name": "rock",
+            "box": [3.0, 3.0, 3.0],
+            "at": [0.0, 0.0, 1.5],
+            "set": [
+                {"dip": 0.0, "dip_direction": 0.0, "spacing": 1.0},
+                {"dip": 90.0, "dip_direction": 90.0, "spacing": 1.0, "through": [0.5, 0.0, 0.0]},
+                {"dip": 90.0, "dip_direction": 0.0, "spacing": 1.0, "through": [0.0, 0.5, 0.0]},
+            ],
+        }
+    ],
+    "in_situ": {"k0": 0.8, "surface": [[0.0, 0.0, 20.0]], "bottom": "fixed"}
+    | dict.fromkeys(("left", "right", "front", "back"), "rollers")
+    | {"top": "loaded"},
+}
+UNIFORM = IN_SITU | {
+    "in_situ": {
+        key: value for key, value in IN_SITU["in_situ"].items() if key not in ("k0", "surface")
+    }
+    | {"stress": [2e5, 2e5, 1e5, 0.0, 0.0, 0.0]}
+}
+STAGE = {"box": [0.9, 0.9, 1.0], "at": [0.0, 0.0, 1.5], "start": 1.0, "release_time": 0.1}
+DUG = IN_SITU | {"excavate": [STAGE]}
+PART = {key: value for key, value in STAGE.items() if key not in ("box", "at")}
+TETRAHEDRON = [[-1.0, -1.0, 0.8], [1.2, -1.0, 0.8], [0.0, 1.5, 0.8], [0.0, 0.0, 2.8]]
+
+
 def with_rock(**keys):
     """A scene with a rock that differs in some keys."""
     return CUT | {"rock": [ROCK | keys]}
@@ -171,6 +201,23 @@ PROBES = {  # path of the key: scene, where the key is in it, another value
     "water.unit_weight": (WET, "water.unit_weight", 9000.0),
     "water.at.time": (RISING, "water.at.0.time", 2.0),
     "water.at.table": (RISING, "water.at.0.table", [[0.0, 0.0, 0.3]]),
+    "in_situ.k0": (IN_SITU, "in_situ.k0", [0.8, 1.0]),
+    "in_situ.stress": (UNIFORM, "in_situ.stress", [2e5, 2e5, 1.1e5, 0.0, 0.0, 0.0]),
+    "in_situ.surface": (IN_SITU, "in_situ.surface", [[0.0, 0.0, 25.0]]),
+    **{
+        f"in_situ.{side}": (IN_SITU, f"in_situ.{side}", "fixed")
+        for side in ("left", "right", "front", "back", "top")
+    },
+    "in_situ.bottom": (IN_SITU, "in_situ.bottom", "rollers"),
+    "excavate.box": (DUG, "excavate.0.box", [1.0, 1.0, 1.0]),
+    "excavate.at": (DUG, "excavate.0.at", [0.1, 0.0, 1.5]),
+    "excavate.corners": (
+        IN_SITU | {"excavate": [PART | {"corners": TETRAHEDRON}]},
+        "excavate.0.corners.3",
+        [0.0, 0.0, 3.2],
+    ),
+    "excavate.start": (DUG, "excavate.0.start", 2.0),
+    "excavate.release_time": (DUG, "excavate.0.release_time", 0.2),
     "run.skin": (
         BLOCKS | {"block": [BASE, ONE, TWO | {"at": [0.1, 0.0, 0.71]}], "run": {"skin": 0.1}},
         "run.skin",

@@ -3,9 +3,9 @@
 A part is one command, which writes a table into a page, between the marks of the same name, or
 pictures into docs/pictures, or an ablation of a shipped scene into docs/data. All other output of
 the command is printed: it has the figures that a page quotes. It is stored in docs/data/printed,
-too, below the command and its time: tests compare the pages with these files. `--list` prints all
-parts: name, pages or files, command. `timed` names all parts that measure times, the tables of
-costs.
+too, below the command and its processor time: tests compare the pages with these files. `--list`
+prints all parts: name, pages or files, command. `timed` names all parts that measure times, the
+tables of costs.
 
 Without a name all parts are made. Parts that measure no time run two at a time, on one thread each;
 parts that measure times come last, one by one: let no other program run meanwhile. Some parts need
@@ -178,31 +178,37 @@ PARTS = {
 def make(name):
     """Run the command of a part and store its output; returns the text that it printed."""
     part = PARTS[name]
-    start = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        printed = run(part, folder).replace(folder, "FOLDER")
+        printed, processor_time = run(part, folder)
         for picture, file in part.pictures.items():
             shutil.copy(Path(folder) / file, DOCS / "pictures" / picture)
     if part.page:
         write_table(part.page, name, first_table(printed))
     PRINTED.mkdir(exist_ok=True)
-    took = f"{time.perf_counter() - start:.0f} s"
-    text = "\n".join([f"python {part.command}  # {took}", printed.rstrip()]) + "\n"
-    (PRINTED / f"{name}.txt").write_text(text, encoding="utf-8")
+    head = f"python {part.command}  # {processor_time:.0f} s of processor time\n"
+    (PRINTED / f"{name}.txt").write_text(f"{head}{printed.rstrip()}\n", encoding="utf-8")
     return printed
 
 
 def run(part, folder):
-    """Run the command of a part; returns the text that it prints."""
+    """Run the command of a part; returns the text that it prints, and its processor time (s).
+
+    The text names the temporary folder FOLDER.
+    """
     words = part.command.replace("FOLDER", folder).split()
     threads = {} if part.is_timed else {"JOINTLAW_THREADS": "1"}
-    process = subprocess.run([sys.executable, *words], cwd=DOCS.parent, env=os.environ | threads,
-                             text=True, capture_output=True)  # fmt: skip
+    with tempfile.TemporaryFile("w+") as printed, tempfile.TemporaryFile("w+") as errors:
+        process = subprocess.Popen([sys.executable, *words], cwd=DOCS.parent, stdout=printed,
+                                   stderr=errors, env=os.environ | threads)  # fmt: skip
+        _, status, usage = os.wait4(process.pid, 0)  # with the time of its own processes
+        process.returncode = os.waitstatus_to_exitcode(status)
+        texts = []
+        for stream in (printed, errors):
+            stream.seek(0)
+            texts.append(stream.read().replace(folder, "FOLDER"))
     if process.returncode:
-        raise RuntimeError(
-            f"{part.command} ended with {process.returncode}:\n{process.stdout}{process.stderr}"
-        )
-    return process.stdout
+        raise RuntimeError(f"{part.command} ended with {process.returncode}:\n{''.join(texts)}")
+    return texts[0], usage.ru_utime + usage.ru_stime
 
 
 def first_table(text):

@@ -182,6 +182,7 @@ def step(k: LawTables, state: Array, d: Array, tangent: bool) -> tuple[Array, Ar
         if C is not None and response.C is not None:
             C = C + response.C
     new[dim] += dissipated
+    new += 0.0  # a negative zero becomes positive, as in the compiled law
     return new, F, C
 
 

@@ -177,7 +177,7 @@ JL_INLINE double jl_coulomb_step(const jlaw_law *law, jl_element_step *p, int ta
   jl_map_to_coulomb_limit(law, &s);
   const double shear_energy = 0.5 * (s.q1[0] * s.q1[0] + s.q1[1] * s.q1[1]) / ks;
   p->loss = tensile_loss + s.loss + (separates ? shear_energy : 0.0);
-  for (int i = 0; i < last; i++) p->F[i + 1] = p->row[i] = touches ? s.q1[i] : 0.0;
+  for (int i = 0; i < last; i++) p->F[i + 1] = p->row[i] = touches ? s.q1[i] + 0.0 : 0.0;
   p->F[0] = s.end;
   p->row[last] = touches ? s.w1 : JLAW_SEPARATED_STATE;
   if (tangent && touches) jl_coulomb_tangent(law, &s, ks * touching, p->C);

@@ -576,6 +576,10 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 
 /* -------------------------------------------------------------- rotated axes */
 
+/* x, or 0.0 for a negative zero: a step writes positive zeros only, and leaves sliders of cells that are
+ * not loaded as they are, so negative zeros would make equal states differ in their bits */
+static JLAW_FUNCTION double jlaw_positive_zero_(double x) { return x + 0.0; }
+
 /* Rotate or reflect the vectors of the elements in the plane of the joint */
 static JLAW_FUNCTION void jlaw_rotate_elements_(const jlaw_law *law, double *s,
                                                 const double rotation[2][2])
@@ -586,23 +590,27 @@ static JLAW_FUNCTION void jlaw_rotate_elements_(const jlaw_law *law, double *s,
     double *q = s + rows[i].first;
     const int count = rows[i].is_vector ? rows[i].count : 0;
     const double old[2] = {count > 0 ? q[0] : 0.0, count > 1 ? q[1] : 0.0};
-    for (int j = 0; j < count; j++) q[j] = rotation[j][0] * old[0] + rotation[j][1] * old[1];
+    for (int j = 0; j < count; j++)
+      q[j] = jlaw_positive_zero_(rotation[j][0] * old[0] + rotation[j][1] * old[1]);
   }
 }
 
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
-  if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
+  if (dim > 1) s[1] = jlaw_positive_zero_(-s[1]); /* shear along axis 2 */
   double *qs = s + jl_slider_row(law), *qt = qs + M * D, *z = qt + M * D;
   for (int f = 0; f < M; f++) {
     const int other =
         (int) jlaw_facet_value_(law, f, JLAW_MIRROR); /* f itself at a right angle to axis 2 */
     if (other < f) continue;                          /* already exchanged */
     for (int i = 0; i < D; i++) {
-      const double qs_f = qs[f * D + i], qt_f = -qt[f * D + i]; /* t reverses */
-      qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
-      qs[other * D + i] = qs_f, qt[other * D + i] = qt_f;
+      const double qs_f = qs[f * D + i];
+      const double qt_f = jlaw_positive_zero_(-qt[f * D + i]); /* t reverses */
+      qs[f * D + i] = qs[other * D + i];
+      qt[f * D + i] = jlaw_positive_zero_(-qt[other * D + i]);
+      qs[other * D + i] = qs_f;
+      qt[other * D + i] = qt_f;
     }
     if (!law->yields) continue;
     const double z_f = z[f];
@@ -647,8 +655,8 @@ static JLAW_FUNCTION void jlaw_limit_sliders_(const jlaw_law *law, double *s)
       const jl_real size = jl_sqrt(qs * qs + qt * qt);
       const jl_mask exceeds = size > limit;
       const jl_real factor = jl_select(exceeds, limit / jl_select(exceeds, size, 1.0), 1.0);
-      jl_store(n, row, D, count, qs * factor);
-      jl_store(n, row + M * D, D, count, qt * factor);
+      jl_store(n, row, D, count, qs * factor + 0.0);
+      jl_store(n, row + M * D, D, count, qt * factor + 0.0);
     }
   }
 }
@@ -661,7 +669,8 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
   if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis reverses */
   if (dim != 3) return;
   const double along = s[1], across = s[2];
-  s[1] = c * along + d * across, s[2] = c * across - d * along;
+  s[1] = jlaw_positive_zero_(c * along + d * across);
+  s[2] = jlaw_positive_zero_(c * across - d * along);
   const double rotation[2][2] = {{c, d}, {-d, c}};
   jlaw_rotate_elements_(law, s, rotation);
   for (int f = 0, n; f < M; f += n) { /* inclinations */
@@ -675,7 +684,7 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
   jlaw_limit_sliders_(law, s);
   const double after = jlaw_measure_(law, s).sheared;
   if (after > before) /* interpolation must not add energy */
-    for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
+    for (int i = 0; i < 2 * M * D; i++) q[i] = jlaw_positive_zero_(q[i] * sqrt(before / after));
   else s[dim] += before - after;
 }
 

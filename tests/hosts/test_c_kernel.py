@@ -5,6 +5,7 @@ Each declared parameter is tested at a value off its default, by header and by t
 
 import contextlib
 import ctypes
+import hashlib
 
 import numpy as np
 import pytest
@@ -32,6 +33,11 @@ const jlaw_law *constants_{0}(void) {{ return &law_{0}; }}
 """
 
 
+def digest(states):
+    """Hash of the bytes of states, which tells 0.0 from -0.0, as a hashed checkpoint does."""
+    return hashlib.sha256(np.ascontiguousarray(states).tobytes()).hexdigest()
+
+
 def many_are_one_by_one(built, one, law):
     """Advance 21 joints of an array, each on its own path, until the step of one is invalid."""
     n = 21
@@ -56,7 +62,7 @@ def many_are_one_by_one(built, one, law):
         expected = joints.update(d[:advanced], where=np.arange(advanced), tangent=bool(tangent))
         for a, b in zip((F, C), expected, strict=True):
             assert b is None or (a[:advanced] == b).all()
-        np.testing.assert_array_equal(states[:, :rows], joints.snapshot().values)
+        assert digest(states[:, :rows]) == digest(joints.snapshot().values)
         assert not states[:, rows:].any()
 
 
@@ -82,7 +88,7 @@ def goes_as_in_python(one, law, seed):
         results = one.step(step)
         for a, b in zip(results, joint.update(step), strict=True):
             np.testing.assert_array_equal(a, b)
-        np.testing.assert_array_equal(one.state, joint.snapshot().values[0])
+        assert digest(one.state) == digest(joint.snapshot().values[0])
         for traction in (traction_without_step(one), joint.F):
             np.testing.assert_array_equal(traction, results[0])
         shares, energies = np.split(one.measures(), [3])
@@ -194,6 +200,7 @@ def test_turned_in_mid_path_is_as_in_turned_axes_from_the_start(lib, tmp_path, l
         one.step(step)
         two.step(R[: law.dim, : law.dim] @ step)
     getattr(lib, f"jlaw_{turn}")(one.law, at(one.state), *angle)
+    assert not np.signbit(one.state[one.state == 0.0]).any()
     F, F_two = ([joint.step(step)[0] for step in path[15:]] for joint in (one, two))
     for rotated, expected in ((one.state, two.state), (F, F_two)):
         error = np.abs(np.subtract(rotated, expected)).max()

@@ -105,6 +105,23 @@ def test_the_tangent_exactly_at_the_friction_limit_is_that_of_sliding_on(both, m
         assert worst(onward[:, :, :2], still[:, :, :2], np.abs(onward).max()) < 1e-5
 
 
+@pytest.mark.parametrize("name", kinds.LAWS)
+def test_zeros_of_states_are_positive(both, name):
+    """States that are equal have equal bytes in either kernel, whichever joints are neighbours."""
+    law = kinds.LAWS[name]
+    d = path(law, len(name), 12)
+    for batch in both(lambda: law.joints(N)):
+        for increments in d:
+            batch.update(increments)
+            states = batch.snapshot().values
+            assert not np.signbit(states[states == 0.0]).any()
+        joint = law.joint()
+        for increment in d[:, 3]:
+            joint.update(increment)
+        if batch.kernel == "native":
+            assert joint.snapshot().values.tobytes() == states[3].tobytes()
+
+
 def test_threads_change_no_bit(monkeypatch):
     law = random_law(10)
     monkeypatch.setattr(engine, "MIN_SLIDERS_FOR_THREADS", 0)

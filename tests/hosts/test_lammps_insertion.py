@@ -1,4 +1,4 @@
-"""Spheres that LAMMPS inserts, removes and displaces during a run have the joints of their own bodies."""
+"""Spheres that LAMMPS inserts, removes or displaces have the joints of their own bodies."""
 
 import re
 
@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 from lammps_host import HEAD, LAWS, run, thermo
 from test_lammps_bodies import AREA, BLOCK, POINTS
-from test_lammps_identity import CLOSURE, OUTPUT, PAIR, SHEAR, SLIP, SLIPS, STEPS, R
+from test_lammps_identity import (
+    CLOSURE,
+    CLOSURES,
+    NORMAL,
+    OUTPUT,
+    PAIR,
+    SHEAR,
+    SLIP,
+    SLIPS,
+    STEPS,
+    R,
+)
 
-NORMAL, CLOSURES = "c_sums[3]", "c_sums[1]"
 SPHERE = f"""A sphere for fix deposit
 
 1 atoms
@@ -30,8 +40,8 @@ Masses
 1 {2600 * 4 / 3 * np.pi * R**3!r}
 """
 
-# the second sphere evaporates in the first step, in which another one is deposited at its place; the ID of
-# the new sphere is the largest present one plus 1, which is the ID of the sphere that is gone
+# the second sphere evaporates in the first step, in which another one is deposited at its place;
+# the new ID is the largest present one plus 1, which is the ID of the sphere that is gone
 REPLACE = f"""unfix push
 fix rest two move linear 0 0 0
 molecule sphere sphere.mol
@@ -73,7 +83,8 @@ pair_coeff * * rock.jlaw
 molecule sphere sphere.mol
 region source block -0.004 0.004 -0.004 0.004 0.1 0.101
 fix weight all gravity 9.81 vector 0 0 -1
-fix source all deposit 3 0 4000 4711 region source mol sphere vx -0.1 0.1 vy -0.1 0.1 vz -6 -6 near 0.02
+fix source all deposit 3 0 4000 4711 region source mol sphere &
+    vx -0.1 0.1 vy -0.1 0.1 vz -6 -6 near 0.02
 fix floor all wall/reflect zlo 0.01
 fix sides all wall/reflect xlo -0.006 xhi 0.006 ylo -0.006 yhi 0.006
 fix motion all nve/sphere
@@ -95,7 +106,7 @@ fix rest small setforce 0 0 0
 
 @pytest.mark.parametrize(("small", "processors"), [("", 1), (SMALL, 2)])
 def test_deposited_spheres_have_contacts(plugin, small, processors):
-    """fix deposit into an empty box, and into a box with a smaller sphere: no sphere passes another."""
+    """fix deposit into an empty box, and beside a smaller sphere: no sphere passes another."""
     (plugin / "sphere.mol").write_text(SPHERE)
     grid = "processors 2 1 1\n" if processors == 2 else ""
     text = run(plugin, DEPOSITED.format(small=small, grid=grid), processors)

@@ -40,7 +40,7 @@ from .output.record import (
 from .output.run import run, steps_to
 from .scene import TEMPLATE, Scene, SceneError, shipped
 from .scene.laws import law_warnings
-from .space import Equilibrium, SpaceScene, Statics, load
+from .space import Equilibrium, SpaceScene, SpaceSimulation, Statics, load, load_simulation
 from .space import output as space_output
 from .space.loads import floating_blocks as floating_blocks_in_space
 from .space.pictures import MISSING, has_pyvista
@@ -151,7 +151,7 @@ def _run(options: argparse.Namespace) -> None:
         raise ValueError("--vtk needs meshio: pip install meshio")
     with _messages_for(options.json):
         if options.command == "resume":
-            sim = Simulation.load(options.state, options.step)
+            sim = load_simulation(options.state, options.step)
             _print_law_warnings(sim.scene)
             print(
                 "the run continues with the scene of its saved state: changes of the scene file "
@@ -159,7 +159,10 @@ def _run(options: argparse.Namespace) -> None:
             )
             _run_simulation(options, sim)
         elif isinstance(scene := _load_scene(options.scene), SpaceScene):
-            _run_in_space(options, scene)
+            if scene.run is None:
+                _run_in_space(options, scene)
+            else:
+                _run_simulation(options, SpaceSimulation(scene))
         else:
             _run_simulation(options, Simulation(scene))
         print(f"results in {options.out}")
@@ -182,27 +185,31 @@ def _print_law_warnings(scene: Scene | SpaceScene) -> None:
 
 def _run_simulation(options: argparse.Namespace, sim: Simulation) -> None:
     """Run a simulation to its end, and write its files."""
-    _describe(sim, options.until, options.format is not None)
+    has_pictures = options.format is not None and isinstance(sim.scene, Scene)
+    _describe(sim, options.until, has_pictures)
     dt = sim.dt
     record, summary = run(sim, options.out, options.until, options.format, options.vtk)
     _report(sim, record, summary, dt)
 
 
 def _load_in_plane(options: argparse.Namespace) -> Scene:
-    """Read the scene of a command that moves blocks. Raises ValueError for a scene in space."""
+    """Read the scene of a command for the plane. Raises ValueError for a scene in space."""
     scene = _load_scene(options.scene)
     if isinstance(scene, SpaceScene):
         raise ValueError(
-            f"{options.command} {options.scene}: blocks in space do not move yet; check, run and "
-            "strength-reduction find their equilibrium"
+            f"{options.command} {options.scene}: for scenes in the plane only; check, run and "
+            "strength-reduction treat blocks in space"
         )
     return scene
 
 
 def _refuse_until(options: argparse.Namespace) -> None:
-    """Refuse --until for a scene in space. Raises ValueError."""
+    """Refuse --until for statics of a scene in space. Raises ValueError."""
     if options.until is not None:
-        raise ValueError("--until: blocks in space do not move yet; leave it out")
+        raise ValueError(
+            "--until: the blocks do not move here; leave it out, or run a scene whose [run] has an "
+            "end"
+        )
 
 
 def _run_in_space(options: argparse.Namespace, scene: SpaceScene) -> None:
@@ -211,7 +218,7 @@ def _run_in_space(options: argparse.Namespace, scene: SpaceScene) -> None:
     statics = Statics(scene)
     result = statics.solve()
     _describe_in_space(statics, result)
-    print("blocks in space do not move yet: the run ends with the static equilibrium")
+    print("the scene has no [run] with an end: the run ends with the static equilibrium")
     picture_format = _space_picture_format(options)
     has_vtk = options.vtk
     if options.format and not picture_format and find_spec("meshio"):
@@ -356,7 +363,7 @@ def _print_unstable(scene: Scene | SpaceScene, verdict: str, unstable: np.ndarra
         )
     else:
         number = "1 block has" if count == 1 else f"{count} blocks have"
-        moves = " and will move from the first step" if isinstance(scene, Scene) else ""
+        moves = " and will move from the first step" if scene.run else ""
         print(f"{number} no static equilibrium{moves}: {blocks}")
 
 
@@ -395,7 +402,7 @@ def _format_duration(seconds: float) -> str:
 
 def _step_time(sim: Simulation) -> float:
     """Time (s) of a step, from the first steps of a copy; 0 where these end with an error."""
-    copy = Simulation(sim.scene, saved=sim.state())
+    copy = type(sim)(sim.scene, saved=sim.state())
     steps = 0
     started = time.perf_counter()
     with contextlib.suppress(SceneError):

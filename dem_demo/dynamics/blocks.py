@@ -19,18 +19,71 @@ FLOATING_SHARE = 1e-6  # of the weight: a smaller rest of buoyancy is rounding
 BROAD_PHASE_STEP = 1e-9  # s: pymunk detects pairs in a step; with no velocity nothing moves
 
 
-class Blocks:
-    """The blocks of a scene; arrays (n, 3) run over blocks and the motions x, y, rotation.
+class RigidBlocks:
+    """What blocks in the plane and in space have in common: removal, damping, largest speed.
 
-    motion (6, n): positions, angles, and the velocities that led there; velocity (3, n): velocities
-    of the next step. The compiled step writes both in place. inertia (n, 3): mass, mass, moment of
-    inertia; inverse_sqrt_inertia (n, 3): of free motions, else 0; inverse_mass (n,) in 1/kg: of
-    blocks that forces move, else 0. is_mobile (n, 1): blocks that move, also fixed rock that a
-    drive moves; is_free (n, 3): motions that forces move; is_removed (n,): excavated blocks.
-    gravity, steady_loads (n, 3): constant forces (N), gravity with the pseudo-static seismic
-    forces; loads (n, 3): steady loads, pressures on edges and support (`apply_loads`); support
-    (n, 3): the remaining part of the forces that removed blocks exerted on the others (N). bolts:
-    the rock bolts, with their forces on the blocks.
+    Arrays as in `Blocks`, with 3 motions of a block in the plane and 6 in space, displacements
+    first.
+    """
+
+    names: list[str]
+    skins: np.ndarray
+    radius: np.ndarray
+    motion: np.ndarray
+    velocity: np.ndarray
+    inverse_mass: np.ndarray
+    inverse_sqrt_inertia: np.ndarray
+    is_mobile: np.ndarray
+    is_free: np.ndarray
+    is_removed: np.ndarray
+
+    def remove(self, rows: list[int]) -> None:
+        """Remove blocks: they neither move nor touch other blocks any more."""
+        self.is_removed[rows] = True
+        for array in (
+            self.is_mobile,
+            self.is_free,
+            self.inverse_sqrt_inertia,
+            self.inverse_mass,
+        ):
+            array[rows] = 0
+        self.motion[len(self.velocity) :, rows] = 0.0
+        self.velocity[:, rows] = 0.0
+
+    def critical_damping(self, rows: ContactRows, stiffness: np.ndarray) -> np.ndarray:
+        """Critical damping (k,) in N s/m of contacts with a stiffness (k,) in N/m.
+
+        2 sqrt(stiffness * reduced mass of the two blocks), with half of a joint for each block.
+        """
+        inverse_mass = self.inverse_mass[rows.block_a] + self.inverse_mass[rows.block_b]
+        reduced_mass = 0.5 / np.where(inverse_mass > 0, inverse_mass, np.inf)
+        return 2.0 * np.sqrt(stiffness * reduced_mass)
+
+    def refuse_speed(self, i: int, dt: float) -> None:
+        """Raise SceneError for block i, too fast for a step dt (s) to find all its contacts."""
+        dim = 2 if len(self.velocity) == 3 else 3
+        speeds = np.abs(self.velocity[:, i])
+        path = (speeds[:dim].sum() + speeds[dim:].sum() * self.radius[i]) * dt
+        limit = MAX_SKIN_PER_STEP * self.skins[i]
+        raise SceneError(
+            f"block {self.names[i]!r} moves {path:.3g} m in one step: must stay below "
+            f"{limit:.3g} m (a quarter of its skin, run.skin); resume with a smaller step"
+        )
+
+
+class Blocks(RigidBlocks):
+    """The blocks of a scene in the plane.
+
+    Arrays (n, 3) run over blocks and the motions x, y, rotation. motion (6, n): positions, angles,
+    and the velocities that led there; velocity (3, n): velocities of the next step. The compiled
+    step writes both in place. inertia (n, 3): mass, mass, moment of inertia; inverse_sqrt_inertia
+    (n, 3): of free motions, else 0; inverse_mass (n,) in 1/kg: of blocks that forces move, else 0.
+    is_mobile (n, 1): blocks that move, also fixed rock that a drive moves; is_free (n, 3): motions
+    that forces move; is_removed (n,): excavated blocks. gravity, steady_loads (n, 3): constant
+    forces (N), gravity with the pseudo-static seismic forces; loads (n, 3): steady loads, pressures
+    on edges and support (`apply_loads`); support (n, 3): the remaining part of the forces that
+    removed blocks exerted on the others (N). bolts: the rock bolts, with their forces on the
+    blocks.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -106,38 +159,6 @@ class Blocks:
     def displace(self, motion: np.ndarray) -> None:
         """Displace the blocks by their motions (n, 3), in m and rad."""
         self.motion[:3] += motion.T
-
-    def remove(self, rows: list[int]) -> None:
-        """Remove blocks: they neither move nor touch other blocks any more."""
-        self.is_removed[rows] = True
-        for array in (
-            self.is_mobile,
-            self.is_free,
-            self.inverse_sqrt_inertia,
-            self.inverse_mass,
-        ):
-            array[rows] = 0
-        self.motion[3:, rows] = 0.0
-        self.velocity[:, rows] = 0.0
-
-    def critical_damping(self, rows: ContactRows, stiffness: np.ndarray) -> np.ndarray:
-        """Critical damping (k,) in N s/m of contacts with a stiffness (k,) in N/m.
-
-        2 sqrt(stiffness * reduced mass of the two blocks), with half of a joint for each block.
-        """
-        inverse_mass = self.inverse_mass[rows.block_a] + self.inverse_mass[rows.block_b]
-        reduced_mass = 0.5 / np.where(inverse_mass > 0, inverse_mass, np.inf)
-        return 2.0 * np.sqrt(stiffness * reduced_mass)
-
-    def refuse_speed(self, i: int, dt: float) -> None:
-        """Raise SceneError for block i, too fast for a step dt (s) to find all its contacts."""
-        u, v, spin = np.abs(self.velocity[:, i])
-        path = (u + v + spin * self.radius[i]) * dt
-        limit = MAX_SKIN_PER_STEP * self.skins[i]
-        raise SceneError(
-            f"block {self.names[i]!r} moves {path:.3g} m in one step: must stay below "
-            f"{limit:.3g} m (a quarter of its skin, run.skin); resume with a smaller step"
-        )
 
 
 def apply_loads(

@@ -113,6 +113,7 @@ class Simulation:
 
     state_paths: ClassVar = STATE
     updated_in_place: ClassVar = UPDATED_IN_PLACE
+    contact_paths: ClassVar = (CONTACT_KEYS,)  # from which `_restore_contacts` makes the contacts
     parse: ClassVar = staticmethod(parse)
 
     def __init__(
@@ -374,6 +375,7 @@ class Simulation:
         balance.booked_dissipation = joints.dissipated_energy.copy()
         self.bind()
         self.arrays.call("compute_forces", 0.5 * self.dt)
+        self._add_gyroscopic_half_step(velocity)
         balance.open(blocks, joints, self.dt)
         half_step = 0.5 * self.dt * balance.forces[0] / blocks.inertia
         velocity += (half_step * blocks.is_free).T
@@ -383,6 +385,9 @@ class Simulation:
         """Find the contacts of the scene as drawn and give them virgin joints; returns the sliding
         (k, dim - 1) in m with which they start."""
         return create_joints(self.scene, self.blocks, self.manager, self.joints)
+
+    def _add_gyroscopic_half_step(self, velocity: np.ndarray) -> None:
+        """Add the change of angular velocities by gyroscopic moments in half a step, none here."""
 
     def _note_initial_places(self) -> None:
         """Keep the places of the blocks at step 0."""
@@ -547,7 +552,7 @@ class Simulation:
 
     def state(self) -> SavedState:
         """A copy of everything that later steps depend on."""
-        paths = (*self.state_paths, CONTACT_KEYS)
+        paths = (*self.state_paths, *self.contact_paths)
         arrays = {path: np.array(attrgetter(path)(self)) for path in paths}
         return self.joints.snapshot() | arrays
 
@@ -624,7 +629,7 @@ class Simulation:
         files = Files(known=json.loads(str(data["files"])))
         scene = cls.parse(str(data["scene"]), str(file), files)
         joints = [f"{part}-{i}" for part in STATE_PARTS for i in range(len(scene.laws))]
-        names = (*cls.state_paths, CONTACT_KEYS, "first_touch", *joints)
+        names = (*cls.state_paths, *cls.contact_paths, "first_touch", *joints)
         return version, scene, {name: data[name] for name in names}
 
 

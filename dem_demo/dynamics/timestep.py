@@ -99,7 +99,7 @@ class TimeStepLimit:
         self.checked_stiffness = growth * self.checked_stiffness
 
 
-def _block_stiffness(
+def block_stiffness(
     block: np.ndarray, kinematics: np.ndarray, springs: np.ndarray, n: int
 ) -> np.ndarray:
     """Stiffness (n, dof, dof) of each block alone on springs that act in all directions.
@@ -116,10 +116,10 @@ def _block_stiffness(
     return stiffness
 
 
-def _largest_eigenvalue(stiffness: np.ndarray, inverse_sqrt_inertia: np.ndarray) -> float:
+def largest_eigenvalue(stiffness: np.ndarray, inverse_sqrt_inertia: np.ndarray) -> float:
     """Largest eigenvalue of any single block.
 
-    stiffness (n, dof, dof): of `_block_stiffness`; inverse_sqrt_inertia (n, dof): zero for
+    stiffness (n, dof, dof): of `block_stiffness`; inverse_sqrt_inertia (n, dof): zero for
     prescribed motions.
     """
     # The largest eigenvalue of a block is at most its trace, and at least its largest diagonal
@@ -146,17 +146,17 @@ def bound_of_blocks(blocks: Blocks, rows: ContactRows, stiffness, dashpot) -> fl
     of_b = rows.kinematics[:, :, dof:]
 
     def stiffness_of_blocks(springs: np.ndarray) -> np.ndarray:
-        K = _block_stiffness(rows.block_a, of_a, weight * springs, n)
-        return K + _block_stiffness(rows.block_b, of_b, weight * springs, n)
+        K = block_stiffness(rows.block_a, of_a, weight * springs, n)
+        return K + block_stiffness(rows.block_b, of_b, weight * springs, n)
 
     K = stiffness_of_blocks(stiffness)
     bolts = blocks.bolts
     if bolts.n:
         elongation = bolts.kinematics(blocks.motion, np.ones((n, dof)))[:, None, :]
-        K += _block_stiffness(bolts.block_a, elongation[:, :, :dof], 2 * bolts.stiffness, n)
-        K += _block_stiffness(bolts.block_b, elongation[:, :, dof:], 2 * bolts.stiffness, n)
-    k = _largest_eigenvalue(K, blocks.inverse_sqrt_inertia)
-    c = _largest_eigenvalue(stiffness_of_blocks(dashpot), blocks.inverse_sqrt_inertia)
+        K += block_stiffness(bolts.block_a, elongation[:, :, :dof], 2 * bolts.stiffness, n)
+        K += block_stiffness(bolts.block_b, elongation[:, :, dof:], 2 * bolts.stiffness, n)
+    k = largest_eigenvalue(K, blocks.inverse_sqrt_inertia)
+    c = largest_eigenvalue(stiffness_of_blocks(dashpot), blocks.inverse_sqrt_inertia)
     return 4 / (c + np.sqrt(c * c + 4 * k)) if k else np.inf
 
 
@@ -231,6 +231,6 @@ def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: fl
         along_x = [zero + 1.0, zero, -arm.imag]
         along_y = [zero, zero + 1.0, arm.real]
         kinematics = np.transpose([along_x, along_y], (2, 0, 1))
-        K += _block_stiffness(outlines.block, kinematics, springs, len(K))
-    largest = _largest_eigenvalue(K, blocks.inverse_sqrt_inertia)
+        K += block_stiffness(outlines.block, kinematics, springs, len(K))
+    largest = largest_eigenvalue(K, blocks.inverse_sqrt_inertia)
     return 2 / np.sqrt(largest) if largest else np.inf

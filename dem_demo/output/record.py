@@ -9,6 +9,7 @@ import numpy as np
 
 from ..dynamics.blocks import pressure_forces
 from ..dynamics.energy_balance import ENERGIES
+from ..dynamics.search import vector_length
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, median_size
 from .monitors import base_displacement, law_between, read_monitors, start_slip_monitors
@@ -73,7 +74,18 @@ class RunRecord:
     @property
     def distances(self) -> np.ndarray:
         """Length (n,) of the displacements from step 0 to the last frame (m)."""
-        return np.hypot(*self.displacements(-1).T)
+        return vector_length(self.displacements(-1))
+
+    @property
+    def settlements(self) -> np.ndarray:
+        """Length (n,) of the displacements from the scene as drawn to step 0 (m)."""
+        drawn = base_displacement(self.scene, self.initial)[:2]
+        centroids = [block.centroid + drawn for block in self.scene.blocks]
+        return np.hypot(*(self.initial[:2].T - centroids).T)
+
+    def median_size(self, blocks: Iterable[int]) -> float:
+        """Median size (m) of blocks, by their numbers."""
+        return median_size(self.scene.blocks[i] for i in blocks)
 
     def series(self, name: str) -> np.ndarray:
         """Reading of a monitor in all frames (f,)."""
@@ -245,19 +257,16 @@ def outcomes(record: RunRecord) -> list[dict]:
     second (or the whole run, if shorter).
     """
     scene = record.scene
-    blocks = scene.blocks
     distances = record.distances
     creep_rates = _creep_rates(record)
-    drawn = base_displacement(scene, record.initial)[:2]
-    centroids = [block.centroid + drawn for block in blocks]
-    settlements = np.hypot(*(record.initial[:2].T - centroids).T)
+    settlements = record.settlements
     entries = []
     for name, group in _groups(scene).items():
         free = [i for i in group if np.isfinite(distances[i])]
         if not free:
             continue
         creep = float(creep_rates[free].max())
-        limit = FAILURE_DISPLACEMENT * median_size(blocks[i] for i in free)
+        limit = FAILURE_DISPLACEMENT * record.median_size(free)
         failed_blocks = int((distances[free] > limit).sum())
         is_test = not scene.rocks and _displaces_blocks(scene)
         entries.append(
@@ -281,7 +290,7 @@ def _creep_rates(record: RunRecord) -> np.ndarray:
     first = int(np.searchsorted(times, times[-1] - CREEP_INTERVAL + 1e-9))
     first = max(min(first, len(times) - 2), 0)
     change = record.displacements(-1) - record.displacements(first)
-    return np.hypot(*change.T) / max(times[-1] - times[first], 1e-300)
+    return vector_length(change) / max(times[-1] - times[first], 1e-300)
 
 
 def _groups(scene: Scene) -> dict[str, list[int]]:

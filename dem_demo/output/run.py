@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -15,6 +16,9 @@ from jointlaw.support.pyplot import FORMATS
 from ..dynamics.energy_balance import ENERGIES
 from ..dynamics.simulation import Simulation, require_text
 from ..scene import Scene, SceneError, median_size
+from ..space.record import SpaceRecord
+from ..space.record import write as write_in_space
+from ..space.simulation import SpaceSimulation
 from .folder import BLOCKS, HISTORY, LAST_VALID_STATE, STATE, clear_run
 from .monitors import update_slip_monitors
 from .pictures import Pictures, curves
@@ -41,12 +45,13 @@ def run(
     Raises ValueError, before the first step, for an `until` that cannot be reached and for a scene
     that cannot be saved.
     """
+    output = SPACE if isinstance(sim, SpaceSimulation) else PLANE
     steps_to(sim, until)
     if folder:
         require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
     started = time.perf_counter()
-    record = RunRecord(sim)
+    record = output.record(sim)
     stopped: BaseException | None = None
     try:
         advance(sim, record, until)
@@ -59,7 +64,7 @@ def run(
         state = folder / (LAST_VALID_STATE if isinstance(stopped, SceneError) else STATE)
         clear_run(folder)
         sim.save(state, record.last_state)
-        write(record, summary, folder, pictures, vtk)
+        output.write(record, summary, folder, pictures, vtk)
         message = (
             f"{message}; resume from {record.times[-1]:.4g} s of model time: "
             f"python -m dem_demo resume {state} --out NEW"
@@ -87,7 +92,7 @@ def summarise(sim: Simulation, record: RunRecord, stopped: BaseException | None 
         "contact_points": sim.joints.n,
         "joint_stresses": "effective" if sim.scene.wet else "total",
         "stage_start_s": [start if start < np.inf else None for start in start_times],
-        "bolts": bolt_summary(record),
+        "bolts": bolt_summary(record) if sim.scene.bolts else [],
         "energy_J": dict(zip(ENERGIES, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
         "max_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),
@@ -165,6 +170,13 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
     return round(steps)
 
 
+class Output(NamedTuple):
+    """What a run records and writes: the class of its record, and the function of its files."""
+
+    record: type[RunRecord]
+    write: Callable[[RunRecord, dict, Path, str | None, bool], None]
+
+
 def write(
     record: RunRecord, summary: dict, folder: Path, picture_format: str | None, vtk: bool
 ) -> None:
@@ -187,3 +199,7 @@ def write(
         from .vtk import write as write_vtk  # loads meshio
 
         write_vtk(record, folder / "vtk")
+
+
+PLANE = Output(RunRecord, write)
+SPACE = Output(SpaceRecord, write_in_space)

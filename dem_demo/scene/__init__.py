@@ -12,7 +12,7 @@ read       a scene from its file
 """
 
 from .blocks import Block, median_size, rotation
-from .drives import Drives
+from .drives import Drive, Drives
 from .keys import Tables, overlay
 from .laws import INTACT_ROCK, TYPICAL_STRESS, Files, build_law
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
@@ -25,6 +25,7 @@ __all__ = [
     "TYPICAL_STRESS",
     "Block",
     "Bolt",
+    "Drive",
     "Drives",
     "FacePressure",
     "Files",

@@ -1,7 +1,9 @@
 """A scene in memory: blocks, laws, drives, stress in the ground, and settings of a run."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -29,8 +31,8 @@ class Run:
     """Settings of a run; times in s, lengths in m."""
 
     end: float
-    corner_length: float  # of the joint at a corner that lies on an edge
-    soft: float  # over which a contact passes from the end of one edge to the next
+    corner_length: float  # of the joint at a corner that lies on an edge; 0 in space
+    soft: float  # over which a contact passes from the end of one edge to the next; 0 in space
     skin: float | None = None  # range of contact detection; None: `Scene.skins` has a default
     fraction: float | None = None  # time step over the stability limit; None: chosen by the scene
     step: float | None = None  # or the time step itself
@@ -194,11 +196,18 @@ class Scene:
 
         In a shaken scene it is a block that moves with all fixed rock, not by a drive of its own.
         """
-        removed = {*self.excavated.removed}
-        fixed = [i for i, block in enumerate(self.blocks) if block.fixed and i not in removed]
-        own_drive = {
-            drive.blocks[0]
-            for drive in self.drives
-            if len(drive.times) > 1 and len(drive.blocks) < len(fixed)
-        }
-        return min(fixed, key=lambda i: i in own_drive, default=None)
+        return base_of(self.blocks, self.drives, {*self.excavated.removed})
+
+
+def base_of(blocks: Sequence[Any], drives: Sequence[Drive], removed: set[int]) -> int | None:
+    """Number of the fixed block that displacements are relative to, see `Scene.base`.
+
+    removed: numbers of blocks that are absent at the end.
+    """
+    fixed = [i for i, block in enumerate(blocks) if block.fixed and i not in removed]
+    own_drive = {
+        drive.blocks[0]
+        for drive in drives
+        if len(drive.times) > 1 and len(drive.blocks) < len(fixed)
+    }
+    return min(fixed, key=lambda i: i in own_drive, default=None)

@@ -1,4 +1,4 @@
-"""Rough blocks in space: convex solids, their contacts face on face, and their statics.
+"""Rough blocks in space: convex solids, their contacts face on face, their statics and motion.
 
 solids     convex polyhedra whose faces remember the joint set that cut them
 meshes     solids from OBJ and STL files
@@ -8,14 +8,31 @@ keys       the keys of all tables of a scene, with a rule for each value
 read       a scene, in the plane or in space, from its file
 loads      water on faces and in joints, stress from outside, and other loads
 contacts   contact points of faces that lie on each other, and their kinematics
+face_laws  law and rough direction of each contact
 statics    static equilibrium, and blocks that have none
 drawing    what a picture shows: faces, edges, states, rough directions
 pictures   pictures by pyvista
 strength   factor of safety, and blocks that fail first
+blocks     blocks in motion
+manager    contact points while blocks move, and their identity in time
+simulation a scene in motion
+output     files of an equilibrium
+record     history and files of a run
 """
 
 from .read import load, parse
 from .scene import SpaceBlock, SpaceRock, SpaceScene
+from .simulation import SpaceSimulation, load_simulation
 from .statics import Equilibrium, Statics
 
-__all__ = ["Equilibrium", "SpaceBlock", "SpaceRock", "SpaceScene", "Statics", "load", "parse"]
+__all__ = [
+    "Equilibrium",
+    "SpaceBlock",
+    "SpaceRock",
+    "SpaceScene",
+    "SpaceSimulation",
+    "Statics",
+    "load",
+    "load_simulation",
+    "parse",
+]

@@ -142,20 +142,40 @@ class ContactPoints(NamedTuple):
     contact: np.ndarray
 
 
+def require_apart(
+    surfaces: Surfaces, names: Sequence[str], skins: np.ndarray, is_removed: np.ndarray
+) -> None:
+    """Require that no blocks overlap as drawn by more than their ranges of contact detection.
+
+    names (n,) of the blocks; skins (n,) in m; is_removed (n,): blocks that are absent. Raises
+    ValueError.
+    """
+    pairs = surfaces.near_pairs(np.zeros(len(skins)))
+    pairs = pairs[~is_removed[pairs].any(axis=1)]
+    allowed = skins[pairs].min(axis=1)
+    depth = -surfaces.separations(pairs, float(allowed.min(initial=np.inf)))
+    for i in np.flatnonzero(depth > allowed)[:1]:
+        first, second = (names[block] for block in pairs[i])
+        raise ValueError(
+            f"blocks {first!r} and {second!r} overlap by {depth[i]:.3g} m as drawn, more "
+            "than the range of contact detection: move one, or set a larger run.skin"
+        )
+
+
 def find_contacts(
-    surfaces: Surfaces, reach: np.ndarray, max_overlap: float, is_removed: np.ndarray | None = None
+    surfaces: Surfaces, reach: np.ndarray, max_overlap: float, pairs: np.ndarray | None = None
 ) -> ContactPoints:
     """Find all contacts of faces at the present places of the blocks.
 
     reach (n,) in m: two faces are in contact where their gap is below the sum of the reaches.
     max_overlap: largest depth of a contact, as a fraction of the width of the narrower block.
-    is_removed (n,): blocks that touch nothing, by default none.
+    pairs (p, 2): of blocks to be searched, the lower number first; by default all near ones.
 
     Raises ValueError for faces of too many corners.
     """
-    pairs = surfaces.near_pairs(reach)
-    if is_removed is not None:
-        pairs = np.ascontiguousarray(pairs[~is_removed[pairs].any(axis=1)])
+    if pairs is None:
+        pairs = surfaces.near_pairs(reach)
+    pairs = np.ascontiguousarray(pairs)
     width = surfaces.width[pairs].min(axis=1)
     max_gap = reach[pairs].sum(axis=1)
     max_depth = max_overlap * width

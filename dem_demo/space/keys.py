@@ -116,7 +116,7 @@ REGION = {
 SHAPE = {"box": positive_vector, "at": vector, "corners": points, "file": TEXT}
 BLOCK = {
     "name!": TEXT, **SHAPE, "density": DENSITY, "fixed": FLAG, "load": vector,
-    **dict.fromkeys(("velocity", "spin", "fixed_motions"), not_there_yet),
+    "velocity": vector, "spin": vector, "fixed_motions": not_there_yet,
 }  # fmt: skip
 SET = {
     "dip!": DIP, "dip_direction!": ANGLE, "spacing!": POSITIVE, "law": TEXT, "through": vector,
@@ -129,12 +129,10 @@ ROCK = {
     "hole": not_there_yet,
 }  # fmt: skip
 RUN = {
-    "skin": POSITIVE, "max_overlap": POSITIVE,
-    **dict.fromkeys(
-        ("end", "fraction", "step", "settle", "record", "dashpot_normal", "dashpot_shear",
-         "law_steps", "corner_length"),
-        not_there_yet,
-    ),
+    "skin": POSITIVE, "max_overlap": POSITIVE, "end": POSITIVE,
+    "fraction": partial(within, low=1e-6, high=0.95, unit="of the limit"),
+    "step": POSITIVE, "settle": FLAG, "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
+    "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
 }  # fmt: skip
 SCENE = {
     "title": TEXT, "gravity": vector, "seismic": seismic_coefficients, "density": DENSITY,

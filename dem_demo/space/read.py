@@ -12,7 +12,7 @@ import jointlaw as jl
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of
 
-from ..scene import Files, Scene, Tables, build_law, read_tables
+from ..scene import Files, Run, Scene, Tables, build_law, read_tables
 from ..scene import build as build_in_plane
 from ..scene.keys import NOT_NEGATIVE, some_of
 from ..scene.laws import INTACT_ROCK, intact_rock_law
@@ -105,7 +105,9 @@ def build(
         max_overlap=top["run"].get("max_overlap", MAX_OVERLAP), water=water, in_situ=in_situ,
         pressure=pressure, stages=stages,
         water_changes=read_water_changes(top.get("water", {}), where),
+        run=_run(top["run"], where),
     )  # fmt: skip
+    _require_end(scene, where)
     _require_rough(scene, "rough" in top, where)
     if any(name == INTACT_ROCK for name, _ in pairs.values()):
         opening = INTACT_OPENING_PER_SKIN * float(scene.skins.min())
@@ -114,6 +116,29 @@ def build(
     for name, value in (("files", files), ("text", text)):  # not copied by `replace`
         object.__setattr__(scene, name, value)
     return scene
+
+
+def _run(table: Tables, where: str) -> Run | None:
+    """Build the settings of a run, None if the blocks do not move. Raises ValueError."""
+    motion_keys = sorted({*table} - {"skin", "max_overlap", "end"})
+    if "end" in table:
+        return Run(**table, corner_length=0.0, soft=0.0)
+    if motion_keys:
+        raise ValueError(
+            f"{where}: run.end is missing, without which the blocks do not move: give it in s, or "
+            f"leave out {', '.join(motion_keys)}"
+        )
+    return None
+
+
+def _require_end(scene: SpaceScene, where: str) -> None:
+    """Require `run.end` where blocks have a velocity. Raises ValueError."""
+    moving = [block.name for block in scene.blocks if block.velocity.any() or block.spin.any()]
+    if moving and scene.run is None:
+        raise ValueError(
+            f"{where}: block[{moving[0]!r}] has a velocity or spin, but run.end is missing, "
+            "without which the blocks do not move: give it in s"
+        )
 
 
 def _law(table: Any, where: str, files: Files) -> jl.Law:

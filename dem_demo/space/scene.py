@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 import jointlaw as jl
 
-from ..scene import Files
-from ..scene.keys import Tables
-from ..scene.scene import MAX_SKIN_PER_WIDTH, SKIN_PER_MEDIAN_WIDTH
+from ..scene import Bolt, Drive, Files, Run, Tables
+from ..scene.scene import MAX_SKIN_PER_WIDTH, SKIN_PER_MEDIAN_WIDTH, base_of
 from .loads import SpaceStress
 from .solids import Solid
 
@@ -21,9 +21,10 @@ class SpaceBlock:
     """A rigid convex block, as drawn.
 
     density in kg/m3; load (3,) in N at the centroid. prescribed: motions ("x", "y", "z", "turn",
-    which is any rotation) that are fixed; of a fixed block none. face_laws: name of the law of each
-    face on a joint of a rock, None for other faces; face_axes (faces, 3): direction of the law's
-    axis 2 on these faces.
+    which is any rotation) that are fixed or follow a drive; of a fixed block none, or all.
+    face_laws: name of the law of each face on a joint of a rock, None for other faces; face_axes
+    (faces, 3): direction of the law's axis 2 on these faces. velocity (3,) in m/s and spin (3,) in
+    rad/s, about x, y and z.
     """
 
     name: str
@@ -34,6 +35,13 @@ class SpaceBlock:
     prescribed: tuple[str, ...] = ()
     face_laws: tuple[str | None, ...] = ()
     face_axes: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    spin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def moves(self) -> bool:
+        """Whether the block moves: freely, or as fixed rock that a drive moves."""
+        return not self.fixed or bool(self.prescribed)
 
     @property
     def centroid(self) -> np.ndarray:
@@ -70,7 +78,7 @@ class SpaceRock:
 
 @dataclass(frozen=True, eq=False)
 class SpaceScene:
-    """All input of the statics of blocks in space; z is up.
+    """All input of the statics and the motion of blocks in space; z is up.
 
     default_law: name of the law of joints that nothing else names. rough: angle (degrees) of the
     law's axis 2 from the dip line on joints in no set (see `contacts.turned_from_dip`). pairs: law
@@ -87,7 +95,8 @@ class SpaceScene:
 
     skin: range (m) of contact detection, None for the default. max_overlap: deepest
     contact, as a fraction of the width of the narrower block. reduction: strength reduction factor
-    of all joints.
+    of all joints. run: settings of a run, None for a scene whose blocks do not move. drives:
+    prescribed motions. points: history points, as (block, position in m).
 
     text: of the file that the scene was read from; files: contents of the files that it names.
     """
@@ -110,8 +119,16 @@ class SpaceScene:
     skin: float | None = None
     max_overlap: float = MAX_OVERLAP
     reduction: float = 1.0
+    run: Run | None = None
+    drives: tuple[Drive, ...] = ()
+    points: tuple[tuple[int, tuple[float, float, float]], ...] = ()
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
+
+    # Of a scene in the plane only, as the simulation reads them
+    bolts: ClassVar[tuple[Bolt, ...]] = ()
+    slip: ClassVar[tuple[tuple[int, int], ...]] = ()
+    shear: ClassVar[tuple[tuple[int, int], ...]] = ()
 
     @cached_property
     def skins(self) -> np.ndarray:
@@ -121,6 +138,14 @@ class SpaceScene:
             return np.full(len(widths), self.skin)
         median = np.median([block.solid.width for block in self.blocks if not block.fixed])
         return np.minimum(SKIN_PER_MEDIAN_WIDTH * median, MAX_SKIN_PER_WIDTH * widths)
+
+    @property
+    def base(self) -> int | None:
+        """The fixed block that displacements are relative to, None without fixed blocks.
+
+        In a shaken scene it is a block that moves with all fixed rock, not by a drive of its own.
+        """
+        return base_of(self.blocks, self.drives, {*self.removed})
 
     @property
     def acceleration(self) -> np.ndarray:

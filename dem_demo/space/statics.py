@@ -19,7 +19,8 @@ from ..contact.joints import stick_response
 from ..dynamics.equilibrium import MIN_FORCE_SCALE, STANDARD_GRAVITY, start_under_stress
 from ..dynamics.relaxation import Verdict
 from ..dynamics.search import EquilibriumSearch, StaticSystem
-from .contacts import Surfaces, contact_axes, contact_rows, find_contacts, turned_from_dip
+from .contacts import Surfaces, contact_axes, contact_rows, find_contacts, require_apart
+from .face_laws import FaceLaws
 from .in_situ import in_situ_traction
 from .loads import applied_loads
 from .scene import SpaceScene
@@ -123,9 +124,11 @@ class Statics:
         self.is_free_motion[self.is_removed] = False
         self.is_free = self.is_free_motion.any(axis=1)
         self.surfaces = Surfaces([block.solid for block in blocks], self.is_free)
-        self._require_apart()
-        self.points = find_contacts(self.surfaces, scene.skins, scene.max_overlap, self.is_removed)
-        self.law, axis_2 = self._laws_and_axes()
+        require_apart(self.surfaces, [block.name for block in blocks], scene.skins, self.is_removed)
+        pairs = self.surfaces.near_pairs(scene.skins)
+        pairs = pairs[~self.is_removed[pairs].any(axis=1)]
+        self.points = find_contacts(self.surfaces, scene.skins, scene.max_overlap, pairs)
+        self.law, axis_2 = FaceLaws(scene, self.surfaces).law_and_axis(self.points)
         self.axes = contact_axes(self.surfaces, self.points, axis_2)
         self.rows = contact_rows(self.surfaces, self.points, self.axes)
         density = np.array([block.density for block in blocks])
@@ -144,48 +147,6 @@ class Statics:
             offset, shears = start_under_stress(joints, stress, self.rows.closure, skin)
             self.start[:, 0] -= offset
             self.start[:, 1:] = shears
-
-    def _require_apart(self) -> None:
-        """Require that no blocks overlap by more than their skins. Raises ValueError."""
-        skins = self.scene.skins
-        pairs = self.surfaces.near_pairs(np.zeros(len(skins)))
-        pairs = pairs[~self.is_removed[pairs].any(axis=1)]
-        allowed = skins[pairs].min(axis=1)
-        depth = -self.surfaces.separations(pairs, float(allowed.min(initial=np.inf)))
-        for a, b in pairs[depth > allowed][:1].tolist():
-            names = [self.scene.blocks[i].name for i in (a, b)]
-            worst = float(depth[(pairs == [a, b]).all(axis=1)][0])
-            raise ValueError(
-                f"blocks {names[0]!r} and {names[1]!r} overlap by {worst:.3g} m as drawn, more "
-                "than the range of contact detection: move one, or set a larger run.skin"
-            )
-
-    def _laws_and_axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number of the law (k,) of each contact point, and its axis 2 (k, 3).
-
-        A `[[joint]]` table of both blocks comes first, then the set of the face of b, then the set
-        of the face of a, then the defaults of the scene.
-        """
-        scene, points, surfaces = self.scene, self.points, self.surfaces
-        names = [*scene.laws]
-        number = {name: i for i, name in enumerate(names)} | {None: -1}
-        law_of_face = np.array([number[law] for block in scene.blocks for law in block.face_laws])
-        axis_of_face = np.concatenate([block.face_axes for block in scene.blocks])
-        face = points.face_b
-        face = np.where(law_of_face[face] < 0, points.face_a, face)
-        law = law_of_face[face]
-        axis_2 = axis_of_face[face]
-        is_default = law < 0
-        angle = np.full(len(law), scene.rough)
-        law[is_default] = number[scene.default_law]
-        for pair, (name, degrees) in scene.pairs.items():
-            low, high = sorted(pair)
-            is_pair = (points.block_a == low) & (points.block_b == high)
-            law[is_pair], angle[is_pair] = number[name], degrees
-            is_default |= is_pair
-        normal = surfaces.normal[points.face_b]
-        axis_2[is_default] = turned_from_dip(normal[is_default], angle[is_default])
-        return law, axis_2
 
     @property
     def untouched(self) -> np.ndarray:

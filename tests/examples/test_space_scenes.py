@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from math import cos, radians, sin
 
@@ -83,7 +84,7 @@ def test_a_run_writes_tables_and_vtk_files(tmp_path, capsys):
     assert main(["wall-3d", "--vtk", "--no-pictures", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "27 free blocks, 66 contacts of faces, 264 contact points" in printed
-    assert "do not move yet" in printed
+    assert "no [run] with an end: the run ends with the static equilibrium" in printed
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["equilibrium"] == "in equilibrium"
     assert (summary["free_blocks"], summary["contact_points"]) == (27, 264)
@@ -115,14 +116,49 @@ def test_a_run_writes_tables_and_vtk_files(tmp_path, capsys):
     [
         ["compare", "wedge"],
         ["ablate", "wedge"],
-        ["wedge", "--until", "1"],
+        ["plane-oblique", "--until", "1"],
         ["strength-reduction", "wedge", "--until", "1"],
     ],
 )
-def test_motion_in_space_is_refused(words, tmp_path, capsys, monkeypatch):
+def test_commands_of_the_plane_are_refused(words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(words) == 2
-    assert "blocks in space do not move yet" in capsys.readouterr().err
+    assert re.search("in the plane only|blocks do not move here", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("name", ["wedge", "wedge-across"])
+def test_wedges_in_motion(name, tmp_path, capsys):
+    """Along the line of intersection the wedge does not move, across it falls 1.2 m in a second.
+
+    All files of the run tell the same story; the balance of energy holds.
+    """
+    assert main([name, "--vtk", "--out", str(tmp_path)]) == 0
+    falls = name == "wedge-across"
+    assert ("1 block has no static equilibrium and will move" in capsys.readouterr().out) == falls
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["rocks"][0]["state"] == ("failed" if falls else "stable")
+    assert summary["model_time_s"] == pytest.approx(1.0, rel=1e-3)
+    assert summary["max_energy_error"] < 1e-3
+    with (tmp_path / "blocks.csv").open(newline="") as file:
+        wedge = next(row for row in csv.DictReader(file) if row["block"] == "slope 4")
+    path = np.array([float(wedge[f"displacement_{axis}_m"]) for axis in "xyz"])
+    assert np.linalg.norm(path) == pytest.approx(1.2 if falls else 0.0, rel=0.05, abs=1e-9)
+    with (tmp_path / "history.csv").open(newline="") as file:
+        history = [*csv.DictReader(file)]
+    frame = len(history) - 1
+    assert frame in (20, 21)  # every 0.05 s, and the end
+    assert float(history[-1]["friction_J"]) == pytest.approx(summary["energy_J"]["friction"])
+    last = meshio.read(tmp_path / "vtk" / f"blocks_{frame:04d}.vtu")
+    is_wedge = np.concatenate(last.cell_data["block"]) == 3
+    displacement = np.concatenate(last.cell_data["displacement_m"])[is_wedge]
+    assert displacement == pytest.approx(path[None], abs=1e-12)
+    contacts = meshio.read(tmp_path / "vtk" / f"contacts_{frame:04d}.vtu")
+    assert set(np.concatenate(contacts.cell_data["block_b"])) == {3.0}
+    if falls:  # down the line of intersection, which plunges to the south
+        plunge = np.arctan(np.tan(radians(40.0)) * cos(radians(30.0)))
+        assert path / np.linalg.norm(path) == pytest.approx(
+            [0.0, -np.cos(plunge), -np.sin(plunge)], abs=1e-3
+        )
 
 
 def test_check_lists_blocks_that_stand_on_an_edge(tmp_path, capsys):

@@ -1,0 +1,346 @@
+"""The contact manager in space: contact points while blocks move, and their identity in time.
+
+Between two rebuilds of the list of contacts a point is fixed to block a, and the compiled step
+follows its closure (`native/face_points.c`). A rebuild clips the faces of blocks that have moved by
+a twentieth of their skin anew, so polygons, points and areas follow.
+
+Identity. A joint remembers its history. A point of a rebuilt list continues the joint of the
+nearest point that the same two faces had before, in the frame of block a. Two new points may
+continue one old joint where a polygon gains a corner; the second gets a copy. Points lie on the
+face of a, so closures do not jump. The roles of the blocks never change.
+
+Seams. A block may slide from one block onto its coplanar neighbour. With new joints rough faces
+would drop there by their whole dilation, although the surface does not end at a seam. The points of
+a new contact continue the joints of the nearest points across the seam instead, if both contacts
+have the face of a or the face of b in common, their other faces are coplanar, and axis 2 points the
+same way (`find_neighbours`). All other faces that meet in a run meet anew: their joints are unmated
+if their law has a mating length.
+
+Only faces support each other. Where blocks touch along an edge or at a corner, tilted by more than
+2 degrees, a rebuild raises an error rather than to miss a contact.
+"""
+
+import numpy as np
+
+from ..compiled import FacePointArrays
+from ..contact import ContactRows
+from ..scene import SceneError
+from .blocks import SpaceBlocks
+from .contacts import MAX_TILT, ContactPoints, contact_axes, find_contacts, require_apart
+from .face_laws import FaceLaws
+from .scene import SpaceScene
+
+MAX_SKIN_UNTIL_REBUILD = 0.05  # fraction of its skin that a block may move until a rebuild
+MOVED_FRACTION = 0.001  # of its skin: blocks that moved less are left out of a rebuild
+MIN_SEAM_COSINE = np.cos(MAX_TILT)  # of the angle between coplanar faces, and between their axes 2
+MAX_SEAM_STEP = 0.05  # of the skin: step between coplanar faces at a seam
+CHECKED_OVERLAP = 0.02  # of the smallest skin: smaller overlaps are not checked
+MIN_SEEN_FRACTION = 0.5  # of an overlap of two blocks, that the deepest contact must see
+POINT_ARRAYS = ("local_point", "local_frame", "plane_offset", "area")  # with the keys, a point
+
+
+class FacePoints(ContactRows):
+    """k contact points of faces on faces as rows, at the present places of the blocks.
+
+    keys (3, k): the two faces, and the number of the point among the points of these faces.
+    local_point (k, 3) in m: from the centroid of a, along its axes. local_frame (k, 3, 3): normal
+    of b, axes 2 and 3, along the axes of b. plane_offset (k,) in m: of the face of b from its
+    centroid.
+    """
+
+    def __init__(self, blocks: SpaceBlocks, keys: np.ndarray, **arrays: np.ndarray) -> None:
+        """Points with these keys and `POINT_ARRAYS`."""
+        k = keys.shape[1]
+        super().__init__(**vars(ContactRows.zeros(k, dim=3, dof=6, n_keys=3)))
+        self.blocks = blocks
+        self.keys[:] = keys
+        for name in POINT_ARRAYS:
+            setattr(self, name, np.ascontiguousarray(arrays[name], float))
+        self.block_a[:] = blocks.surfaces.block_of_face[self.face_a]
+        self.block_b[:] = blocks.surfaces.block_of_face[self.face_b]
+        self.arrays = FacePointArrays(n_blocks=len(blocks.names), n_points=k)
+        self.arrays.bind(blocks, "motion", "axes")
+        self.arrays.bind(
+            self, "block_a", "block_b", "local_point", "local_frame", "plane_offset", "closure",
+            "kinematics",
+        )  # fmt: skip
+        self.update()
+
+    @classmethod
+    def none(cls, blocks: SpaceBlocks) -> "FacePoints":
+        """No points."""
+        sizes = {"local_point": (0, 3), "local_frame": (0, 3, 3), "plane_offset": 0, "area": 0}
+        arrays = {name: np.zeros(size) for name, size in sizes.items()}
+        return cls(blocks, np.zeros((3, 0), np.int64), **arrays)
+
+    @classmethod
+    def found(cls, blocks: SpaceBlocks, points: ContactPoints, axis_2: np.ndarray) -> "FacePoints":
+        """Points that a search has found, with directions of axis 2 (k, 3)."""
+        surfaces = blocks.surfaces
+        first = np.searchsorted(points.contact, points.contact)
+        keys = np.array([points.face_a, points.face_b, np.arange(len(first)) - first])
+        arm = points.point - surfaces.position[points.block_a]
+        axes = contact_axes(surfaces, points, axis_2)
+        corner = surfaces.corner[surfaces.first_corner[points.face_b]]
+        of_a, of_b = (surfaces.rotation[block] for block in (points.block_a, points.block_b))
+        return cls(
+            blocks,
+            keys,
+            local_point=np.einsum("kji,kj->ki", of_a, arm),
+            local_frame=axes @ of_b,
+            plane_offset=np.einsum(
+                "ki,ki->k", surfaces.local_normal[points.face_b], surfaces.local_vertex[corner]
+            ),
+            area=points.area,
+        )
+
+    def joined(self, rows: np.ndarray, others: "FacePoints") -> "FacePoints":
+        """The points `rows` of these and all points of others."""
+        arrays = {
+            name: np.concatenate([getattr(self, name)[rows], getattr(others, name)])
+            for name in POINT_ARRAYS
+        }
+        keys = np.concatenate([self.keys[:, rows], others.keys], axis=1)
+        return FacePoints(self.blocks, keys, **arrays)
+
+    @property
+    def face_a(self) -> np.ndarray:
+        """Face (k,) of block a on which the point lies."""
+        return self.keys[0]
+
+    @property
+    def face_b(self) -> np.ndarray:
+        """Face (k,) of block b."""
+        return self.keys[1]
+
+    @property
+    def face_pairs(self) -> np.ndarray:
+        """The two faces (k, 2) that meet."""
+        return np.ascontiguousarray(self.keys[:2].T)
+
+    @property
+    def codes(self) -> np.ndarray:
+        """One number (k,) for the two faces."""
+        return self.face_a * len(self.blocks.surfaces.local_normal) + self.face_b
+
+    @property
+    def contact(self) -> np.ndarray:
+        """Number (k,) of the contact of two faces, whose points follow each other."""
+        return np.cumsum(self.keys[2] == 0) - 1
+
+    @property
+    def point(self) -> np.ndarray:
+        """Places (k, 3) of the points in m."""
+        blocks = self.blocks
+        arm = np.einsum("kij,kj->ki", blocks.axes[self.block_a], self.local_point)
+        return blocks.motion[:3].T[self.block_a] + arm
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Normal of b, axis 2 and axis 3 (k, 3, 3) of the points."""
+        return np.einsum("kij,kcj->kci", self.blocks.axes[self.block_b], self.local_frame)
+
+    def update(self) -> None:
+        """Compute closures and kinematics at the present places of the blocks."""
+        self.arrays.call("update_face_points")
+
+
+class FaceContactManager:
+    """The contacts of a scene in space, k points at present.
+
+    contacts: the points; law (k,): number of the law; face_pairs (k, 2): the faces that meet.
+    closure_offset (k,) in m: depth at zero closure, of points that were found when they overlapped
+    already, until they open. rebuilt_at (6, n): motion at which the contacts of each block were
+    last searched; needs_rebuild (n,): blocks whose contacts must be searched wherever they are.
+    skins (n,) in m: a contact is found at a gap of the sum of two skins.
+    """
+
+    def __init__(self, scene: SpaceScene, blocks: SpaceBlocks) -> None:
+        self.blocks = blocks
+        self.max_skin_until_rebuild = MAX_SKIN_UNTIL_REBUILD
+        self.skins = scene.skins
+        self.max_overlap_fraction = scene.max_overlap
+        self.max_overlap = scene.max_overlap * blocks.surfaces.width
+        self.is_fixed = np.array([block.fixed for block in scene.blocks])
+        self.face_laws = FaceLaws(scene, blocks.surfaces)
+        require_apart(blocks.surfaces, blocks.names, scene.skins, blocks.is_removed)
+        self.law = np.zeros(0, int)
+        self.face_pairs = np.zeros((0, 2), int)
+        self.closure_offset = np.zeros(0)
+        self.needs_rebuild = np.zeros(len(blocks.names), bool)
+        self.rebuilt_at = np.full((6, len(blocks.names)), np.nan)  # never
+        self.contacts = FacePoints.none(blocks)
+
+    @property
+    def closure(self) -> np.ndarray:
+        """Closure (k,) of the joints: depth less closure offset (m)."""
+        has_offset = (self.contacts.closure > 0) | (self.closure_offset < 0)
+        return self.contacts.closure - np.where(has_offset, self.closure_offset, 0.0)
+
+    def update(self, motion: np.ndarray) -> None:
+        """Update the points to the present places of the blocks, whose motion is (12, n)."""
+        self.contacts.update()
+
+    def rebuild(
+        self, motion: np.ndarray, candidates: np.ndarray, keep_closure: bool = True
+    ) -> np.ndarray:
+        """Rebuild the list of points, next to blocks that have moved.
+
+        motion: (12, n), of the blocks; candidates (p, 2): pairs of neighbouring blocks;
+        keep_closure: whether a new point that overlaps already is closed by its depth, as at the
+        start of a run. Otherwise the depth becomes its closure offset, so that it brings no energy.
+
+        Returns the row (k,) in the list before of the point whose joint each point continues, -1
+        for a new one. Raises SceneError where blocks touch and no faces support them.
+        """
+        has_moved = self._blocks_to_rebuild(motion)
+        self.blocks.place()
+        pairs = candidates[has_moved[candidates].any(axis=1)]
+        pairs = np.ascontiguousarray(pairs[~self.is_fixed[pairs].all(axis=1)])
+        present = self.contacts
+        is_searched = has_moved[present.block_a] | has_moved[present.block_b]
+        kept = np.flatnonzero(~is_searched)
+        searched = np.flatnonzero(is_searched)
+        surfaces = self.blocks.surfaces
+        points = find_contacts(surfaces, self.skins, self.max_overlap_fraction, pairs)
+        law, axis_2 = self.face_laws.law_and_axis(points)
+        detected = FacePoints.found(self.blocks, points, axis_2)
+        old_row = _nearest(detected, present, searched)
+        self._require_faces(pairs, detected, searched[~np.isin(searched, old_row)])
+        new_offset = np.maximum(detected.closure, 0.0) * (not keep_closure)
+        old_offset = np.append(self.closure_offset, 0.0)[old_row]
+        offset = np.where(old_row < 0, new_offset, old_offset)
+        self.law = np.concatenate([self.law[kept], law])
+        self.closure_offset = np.concatenate([self.closure_offset[kept], offset])
+        self.contacts = present.joined(kept, detected)
+        self.face_pairs = self.contacts.face_pairs
+        return np.concatenate([kept, old_row])
+
+    def _blocks_to_rebuild(self, motion: np.ndarray) -> np.ndarray:
+        """Mask (n,) of the blocks whose contacts must be found again, as in the plane.
+
+        Their present positions are recorded as the positions of the rebuild.
+        """
+        moved = motion[:6] - self.rebuilt_at
+        rotation = np.abs(moved[3:]).sum(axis=0)
+        distance = np.linalg.norm(moved[:3], axis=0) + rotation * self.blocks.radius
+        has_rested = distance <= MOVED_FRACTION * self.skins  # false before the first rebuild
+        has_moved = self.needs_rebuild | ~has_rested
+        self.rebuilt_at[:, has_moved] = motion[:6, has_moved]
+        self.needs_rebuild[:] = False
+        return has_moved
+
+    def _require_faces(self, pairs: np.ndarray, found: FacePoints, ended: np.ndarray) -> None:
+        """Refuse blocks that touch where no faces support them.
+
+        pairs (p, 2): searched pairs of blocks; found: their points; ended: rows of points that no
+        point continues. Raises SceneError.
+        """
+        surfaces = self.blocks.surfaces
+        present = self.contacts
+        ended = ended[self.closure[ended] > 0]
+        normal_a, normal_b = surfaces.normal[present.keys[:2, ended]]
+        tilt = np.arccos(np.clip(-np.einsum("ki,ki->k", normal_a, normal_b), -1.0, 1.0))
+        for row in ended[(tilt > MAX_TILT) & ~self.blocks.is_removed[present.block_a[ended]]][:1]:
+            self._refuse_edge(present.block_a[row], present.block_b[row])
+        tolerance = CHECKED_OVERLAP * float(self.skins.min())
+        overlap = -surfaces.separations(pairs, tolerance)
+        for i in np.flatnonzero(overlap > tolerance):
+            a, b = pairs[i]
+            is_pair = (found.block_a == a) & (found.block_b == b)
+            seen = found.closure[is_pair].max(initial=0.0)
+            if overlap[i] > min(self.max_overlap[a], self.max_overlap[b]):
+                self.refuse_overlap((a, b), overlap[i])
+            if seen < MIN_SEEN_FRACTION * overlap[i]:
+                self._refuse_edge(a, b)
+
+    def _refuse_edge(self, a: int, b: int) -> None:
+        """Raise SceneError for two blocks that touch along an edge or at a corner."""
+        names = self.blocks.names
+        raise SceneError(
+            f"blocks {names[a]!r} and {names[b]!r} touch along an edge or at a corner, tilted by "
+            f"more than {np.degrees(MAX_TILT):.0f} degrees: blocks in space are in contact by "
+            "their faces only, so this run cannot go on"
+        )
+
+    def refuse_overlap(self, pair, depth: float) -> None:
+        """Raise SceneError for an overlap (m) of two blocks beyond run.max_overlap."""
+        first, second = (self.blocks.names[n] for n in pair)
+        raise SceneError(
+            f"blocks {first!r} and {second!r} overlap by {depth:.3g} m: must stay below "
+            f"{self.max_overlap[list(pair)].min():.3g} m (a share of the narrower block's width); "
+            "draw them apart, resume with a smaller step, or use stiffer joints, lower loads or "
+            "speeds, or a larger run.max_overlap"
+        )
+
+    def find_neighbours(self, rows: np.ndarray, bears_load: np.ndarray) -> np.ndarray:
+        """Points (m,) whose joints the points `rows` (m,) continue across a seam; -1 for none.
+
+        bears_load (k,): points that bear a load.
+        """
+        contacts = self.contacts
+        loaded = np.flatnonzero(bears_load)
+        position = contacts.point
+        axis_2 = contacts.directions[:, 1]
+        neighbours = np.full(len(rows), -1)
+        for i, row in enumerate(rows):
+            skin = 0.5 * (self.skins[contacts.block_a[row]] + self.skins[contacts.block_b[row]])
+            distance = np.linalg.norm(position[loaded] - position[row], axis=1)
+            step = np.abs(contacts.closure[loaded] - contacts.closure[row])
+            cosine = axis_2[loaded] @ axis_2[row]
+            is_candidate = (distance <= skin) & (step <= MAX_SEAM_STEP * skin)
+            is_candidate &= (self.law[loaded] == self.law[row]) & (cosine >= MIN_SEAM_COSINE)
+            candidates = loaded[is_candidate]
+            is_neighbour = np.zeros(len(candidates), bool)
+            for shared, other in ((0, 1), (1, 0)):
+                has_shared = contacts.keys[shared, candidates] == contacts.keys[shared, row]
+                across_seam = contacts.keys[other, candidates]
+                is_coplanar = self._are_coplanar(across_seam, contacts.keys[other, row], skin)
+                is_neighbour |= has_shared & is_coplanar
+            if is_neighbour.any():
+                nearest = distance[is_candidate][is_neighbour].argmin()
+                neighbours[i] = candidates[is_neighbour][nearest]
+        return neighbours
+
+    def _are_coplanar(self, faces: np.ndarray, other: int, skin: float) -> np.ndarray:
+        """Whether faces (m,) of other blocks continue the face `other` across a seam.
+
+        They are parallel within 2 degrees, and their planes differ by less than `MAX_SEAM_STEP` of
+        a skin (m).
+        """
+        surfaces = self.blocks.surfaces
+        normal = surfaces.normal[other]
+        corner = surfaces.vertex[surfaces.corner[surfaces.first_corner[faces]]]
+        step = (corner - surfaces.ring(other)[0]) @ normal
+        is_parallel = surfaces.normal[faces] @ normal >= MIN_SEAM_COSINE
+        is_level = np.abs(step) <= MAX_SEAM_STEP * skin
+        is_of_other_block = surfaces.block_of_face[faces] != surfaces.block_of_face[other]
+        return is_parallel & is_level & is_of_other_block
+
+    def between(self, one: int, other: int) -> np.ndarray:
+        """Mask (k,) of the points between two blocks."""
+        contacts = self.contacts
+        return (contacts.block_a == min(one, other)) & (contacts.block_b == max(one, other))
+
+
+def _nearest(found: FacePoints, present: FacePoints, rows: np.ndarray) -> np.ndarray:
+    """Row (k,) of the nearest present point of the same two faces, -1 where there is none.
+
+    rows (m,): present points to be compared; distances are in the frame of block a.
+    """
+    order = rows[np.argsort(present.codes[rows], kind="stable")]
+    known = present.codes[order]
+    first = np.searchsorted(known, found.codes)
+    last = np.searchsorted(known, found.codes, side="right")
+    nearest = np.full(len(first), -1)
+    smallest = np.full(len(first), np.inf)
+    for number in range(int((last - first).max(initial=0))):
+        has_one = first + number < last
+        row = order[first[has_one] + number]
+        arm = present.local_point[row] - found.local_point[has_one]
+        distance = (arm**2).sum(axis=1)
+        is_nearer = distance < smallest[has_one]
+        place = np.flatnonzero(has_one)[is_nearer]
+        nearest[place] = row[is_nearer]
+        smallest[place] = distance[is_nearer]
+    return nearest

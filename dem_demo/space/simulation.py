@@ -1,0 +1,175 @@
+"""A scene in space in motion: the simulation of the plane with the contacts of faces.
+
+Time step, energy balance, excavation, drives and saved states are written once, for blocks with 3
+motions and with 6 (`dynamics/simulation.py`). This module replaces what depends on the geometry.
+"""
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..compiled import StepArrays, function_address
+from ..contact import Joints
+from ..dynamics.energy_balance import DISCARDED, EnergyBalance
+from ..dynamics.equilibrium import start_under_stress
+from ..dynamics.simulation import (
+    CONTACT_KEYS,
+    STATE,
+    UPDATED_IN_PLACE,
+    WIDE_MARGIN,
+    SavedState,
+    Simulation,
+    find_state,
+    read_arrays,
+)
+from ..scene import read_tables
+from ..scene.read import is_in_space
+from .blocks import SpaceBlocks, apply_loads, impact_limit
+from .in_situ import in_situ_traction
+from .manager import POINT_ARRAYS, FaceContactManager, FacePoints
+from .read import parse
+from .scene import SpaceScene
+
+OF_BOLTS = "blocks.bolts."  # paths of the state that only the plane has
+
+
+class SpaceSimulation(Simulation):
+    """A scene in space in motion; see `Simulation`.
+
+    initial (12, n): motion at step 0; initial_axes (n, 3, 3): principal axes of the blocks then.
+
+    Raises ValueError for a scene without a `[run]` table with an `end`.
+    """
+
+    updated_in_place: ClassVar = (
+        *(path for path in UPDATED_IN_PLACE if not path.startswith(OF_BOLTS)),
+        "blocks.axes",
+    )
+    state_paths: ClassVar = (
+        *(path for path in STATE if not path.startswith(OF_BOLTS)),
+        "blocks.axes",
+        "initial_axes",
+    )
+    contact_paths: ClassVar = (CONTACT_KEYS, *(f"contacts.{name}" for name in POINT_ARRAYS))
+    parse: ClassVar = staticmethod(parse)
+    scene: SpaceScene
+    blocks: SpaceBlocks
+    manager: FaceContactManager
+
+    def __init__(
+        self, scene: SpaceScene, step: float | None = None, saved: SavedState | None = None
+    ) -> None:
+        if scene.run is None:
+            raise ValueError("the blocks of this scene do not move: give end (s) in [run]")
+        super().__init__(scene, step, saved)
+
+    def _create_parts(self) -> None:
+        scene = self.scene
+        self.blocks = SpaceBlocks(scene)
+        self.manager = FaceContactManager(scene, self.blocks)
+        self.joints = Joints(scene)
+        self.energy_balance = EnergyBalance(len(scene.blocks), dof=6)
+
+    @property
+    def contacts(self) -> FacePoints:
+        """The contact points at the present places of the blocks."""
+        return self.manager.contacts
+
+    def _apply_loads(self, *_: Any) -> np.ndarray:
+        manager = self.manager
+        return apply_loads(self.scene, self.blocks, manager.contacts, manager.law, self.water_time)
+
+    def _impact_limit(self, stiffness: float) -> float:
+        return impact_limit(self.blocks, stiffness)
+
+    def _create_joints(self) -> np.ndarray:
+        blocks = self.blocks
+        manager = self.manager
+        old_row = manager.rebuild(blocks.motion, blocks.neighbour_pairs())
+        self.joints.rearrange(old_row, manager.law, manager.face_pairs)
+        self._apply_loads()
+        if self.scene.in_situ is None or not self.joints.n:
+            return np.zeros((self.joints.n, 2))
+        contacts = manager.contacts
+        stress = in_situ_traction(self.scene, contacts, contacts.directions)
+        skin = float(manager.skins.min())
+        offset, shears = start_under_stress(self.joints, stress, contacts.closure, skin)
+        manager.closure_offset = offset
+        return shears
+
+    def _note_initial_places(self) -> None:
+        super()._note_initial_places()
+        self.initial_axes = self.blocks.axes.copy()
+
+    def _add_gyroscopic_half_step(self, velocity: np.ndarray) -> None:
+        acceleration = self.blocks.gyroscopic_acceleration()
+        velocity[3:] += 0.5 * self.dt * acceleration * self.blocks.is_free[:, 3:].T
+
+    def _bind_geometry(self, arrays: StepArrays) -> None:
+        arrays.bind(self.blocks, "axes")
+        arrays.bind(geometry=self.contacts.arrays)
+        arrays.update_geometry = function_address("update_face_points")
+
+    # ------------------------------------------------------------------ contacts that change
+
+    def _update_contact_list(self) -> None:
+        """Rebuild the list of points, and book the stored energy that is lost by it.
+
+        The polygons of sliding blocks change, and points that continue a joint keep its energy per
+        area. Where the stored energy of all points becomes smaller, the difference is discarded.
+        Where it becomes larger, the balance shows an error.
+        """
+        balance = self.energy_balance
+        energy_before = float(balance.booked_area @ self.joints.stored_energy)
+        is_new = self._rebuild_contacts()
+        self._continue_across_seams(is_new)
+        balance.booked_area = self.contacts.area.copy()
+        balance.booked_dissipation = self.joints.dissipated_energy.copy()
+        energy_after = float(balance.booked_area @ self.joints.stored_energy)
+        balance.energy[DISCARDED] += max(energy_before - energy_after, 0.0)
+        self.bind()
+        balance.change_loads(self.blocks, self._apply_loads(), self.dt)
+        self.arrays.call("set_increments", self.dt)
+
+    def _rebuild_contacts(self) -> np.ndarray:
+        """Rebuild the list of points; returns the mask (k,) of the new ones."""
+        blocks = self.blocks
+        manager = self.manager
+        limit = self.limit
+        if self.dt > WIDE_MARGIN * limit.current:  # areas and lever arms have changed
+            limit.checked_stiffness[:] = 0.0
+        old_row = manager.rebuild(blocks.motion, blocks.neighbour_pairs(), keep_closure=False)
+        limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[old_row]
+        self.joints.rearrange(old_row, manager.law, manager.face_pairs, started=True)
+        return old_row < 0
+
+    def _continue_across_seams(self, is_new: np.ndarray) -> None:
+        """Let new points on a coplanar block continue the joints across the seam."""
+        manager = self.manager
+        joints = self.joints
+        rows = np.flatnonzero(is_new)
+        sources = manager.find_neighbours(rows, joints.stored_energy > 0)
+        rows, sources = rows[sources >= 0], sources[sources >= 0]
+        if len(rows):
+            manager.closure_offset[rows] = manager.closure_offset[sources]
+            joints.continue_joints(rows, sources)
+
+    # ------------------------------------------------------------------ saved states
+
+    def _restore_contacts(self, saved: SavedState) -> None:
+        arrays = {name: saved[f"contacts.{name}"] for name in POINT_ARRAYS}
+        self.manager.contacts = FacePoints(self.blocks, saved[CONTACT_KEYS], **arrays)
+
+
+def load_simulation(folder: Path, step: float | None = None) -> Simulation:
+    """Continue from a folder that `Simulation.save` wrote, in the plane or in space.
+
+    step: another time step (s). Raises ValueError as `Simulation.load`.
+    """
+    try:
+        text = str(read_arrays(find_state(folder))["scene"])
+        kind = SpaceSimulation if is_in_space(read_tables(text)) else Simulation
+    except (OSError, EOFError, LookupError):
+        kind = Simulation  # which names the damage
+    return kind.load(folder, step)

@@ -262,10 +262,14 @@ def test_cells_as_thin_as_the_cycle_keep_its_dissipation():
     assert np.abs(finest[1]).max() < 1e-3
 
 
-# dissipation at amplitudes 0.1 and 0.32, shear left after 100 openings by 0.01 and 0.1
+# dissipation over the exact one at amplitudes 0.032, 0.1, 0.32 and 1; shear left after 100 openings
+# by 0.01 and 0.1
 PAGE = {
-    "balanced": ((1.20, 1.05), (0.848, 0.786)),
-    "fine": ((1.11, 1.01), (0.952, 0.883)),
+    "fast": (None, (0.70, 0.56)),
+    "balanced": ((0.07, 1.20, 1.05, 1.01), (0.85, 0.79)),
+    "fine": ((0.49, 1.11, 1.01, 1.00), (0.95, 0.88)),
+    "reference": (None, (0.987, 0.922)),
+    jl.Resolution(5, 7, 200): ((1.0, 1.0, 1.0, 1.0), (0.993, 0.928)),
 }
 
 
@@ -274,7 +278,7 @@ def test_small_cycles_of_named_resolutions_are_as_the_page_says():
     one = replace(jl.presets.load("westerly-rough"), plane=0.0)
     R = one.closure_range
     exact = []
-    amplitudes = AMPLITUDES[[16, 20]] * R
+    amplitudes = AMPLITUDES[[12, 16, 20, 24]] * R
     for amplitude in amplitudes:
         quarter = np.linspace(0.0, amplitude, 41)[1:]
         back = np.concatenate([quarter[::-1][1:], [0.0], -quarter])
@@ -285,9 +289,10 @@ def test_small_cycles_of_named_resolutions_are_as_the_page_says():
         exact.append(trapezoid(F[last_cycle, 1], shear[last_cycle]))
     for name, (ratios, fractions) in PAGE.items():
         variant = replace(one, resolution=name)
-        # 300 springs, orientations and the trapezoids of 40 steps a quarter, each below 1 %
-        dissipation, _ = shear_cycles(variant, amplitudes)
-        np.testing.assert_allclose(dissipation / exact, ratios, rtol=2e-2)
+        if ratios:
+            # 300 springs, orientations and the trapezoids of 40 steps a quarter, each below 1 %
+            dissipation, _ = shear_cycles(variant, amplitudes)
+            np.testing.assert_allclose(dissipation / exact, ratios, rtol=2e-2, atol=5e-3)
         joints = variant.joints(2)
         joints.update(np.tile([CLOSURE * R, 0.0], (2, 1)))
         locked_in, _ = joints.update(np.tile([0.0, 0.1 * R], (2, 1)))
@@ -295,7 +300,8 @@ def test_small_cycles_of_named_resolutions_are_as_the_page_says():
         for _ in range(100):
             joints.update(-opening, tangent=False)
             F, _ = joints.update(opening, tangent=False)
-        np.testing.assert_allclose(F[:, 1] / locked_in[:, 1], fractions, atol=1e-3)
+        half_a_digit = 5e-3 if max(fractions) < 0.96 else 5e-4
+        np.testing.assert_allclose(F[:, 1] / locked_in[:, 1], fractions, atol=half_a_digit)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ..kernels.admissible import require_admissible_states
 from ..kernels.element import Measures
@@ -49,32 +49,52 @@ class JointBatch:
     that moves by +d is -area * F.
 
     law: of the joints; n: their number; track_dissipation: without it the dissipated energy is not
-    available, which is faster with the compiled kernel.
+    available, which is faster with the compiled kernel. slider_dtype: numpy.float32 stores the
+    forces of sliders, most numbers of a state, as 32-bit floats; other numbers and all arithmetic
+    stay in double precision (docs/accuracy.md, "Memory"). Raises ValueError for another dtype.
 
     >>> joints = law.joints(1000)
     >>> F, _ = joints.update(np.full((1000, 3), 1e-9), tangent=False)
     """
 
     # law: of the class jointlaw.laws.law.Law, which imports this module
-    def __init__(self, law: Any, n: int, track_dissipation: bool = True) -> None:
+    def __init__(
+        self,
+        law: Any,
+        n: int,
+        track_dissipation: bool = True,
+        slider_dtype: DTypeLike = np.float64,
+    ) -> None:
         self.law = law
         self.track_dissipation = track_dissipation
-        self._engine = engine(law.tables)
+        self.slider_dtype = _slider_dtype(slider_dtype)
+        float_sliders = self.slider_dtype == np.float32
+        self._engine = engine(law.tables, float_sliders)
         self._n = integer("n", n, 0)
-        lanes = 1 if self._n == 1 else JOINTS_PER_BLOCK
+        lanes = 1 if self._n == 1 and not float_sliders else JOINTS_PER_BLOCK
         self._state = allocate_blocks(self._n, self._engine.rows, lanes)
         self._closure_bound = 0.0  # upper bound of |y| of all facets of all joints
         self._closure_per_displacement = law.tables.closure_per_displacement
+        self._max_effective_closure = law.max_effective_closure
+        if float_sliders:
+            self._max_effective_closure = law.tables.max_closure_with_float_sliders
 
     def __getstate__(self) -> dict[str, Any]:
         return {
             "law": self.law,
             "track_dissipation": self.track_dissipation,
+            "slider_dtype": self.slider_dtype,
             "states": self.snapshot(),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        JointBatch.__init__(self, state["law"], len(state["states"]), state["track_dissipation"])
+        JointBatch.__init__(
+            self,
+            state["law"],
+            len(state["states"]),
+            state["track_dissipation"],
+            state["slider_dtype"],
+        )
         self.restore(state["states"])
 
     def __len__(self) -> int:
@@ -134,20 +154,23 @@ class JointBatch:
         Joints move between batches by `other.restore(batch.snapshot(where), places)`. Raises
         ValueError if another law wrote the state, it holds another number of joints, or a number
         beyond its bounds (`jointlaw.kernels.admissible`); all joints are then as they were.
+
+        Between batches of one `slider_dtype` a restored state is exact. A batch with numpy.float32
+        rounds the slider forces of a state from a batch with numpy.float64 to the nearest float.
         """
         index = None if where is None else self._index(where)
         if not isinstance(state, JointState):
             raise ValueError(f"state = {state!r} is not a snapshot; give one of snapshot()")
         state.require(self.law.fingerprint)
         n = self._n if index is None else len(index)
-        rows = self.law.state_size
-        if state.values.shape != (n, rows):
+        if state.values.shape != (n, self.law.state_size):
             raise ValueError(
                 f"state holds {len(state)} joints, for {n} of the batch: resize it, or "
                 "name as many by where"
             )
         require_admissible_states(self.law.tables, state.values)
-        values = state.values
+        values = self._engine.pack(state.values)
+        rows = self._engine.state_rows
         if index is None:
             lanes = self._state.shape[2]
             in_full_blocks = n // lanes * lanes
@@ -181,7 +204,8 @@ class JointBatch:
         """
         joints = self._index(index)
         for row, damage in self.law.tables.damage_rows.items():
-            self._state[block_index(self._state, joints, row)] = damage
+            place = self._engine.row(row)
+            self._state[block_index(self._state, joints, place)] = damage
 
     def resize(self, n: int) -> None:
         """Change the number of joints to n; the first joints keep their states.
@@ -286,7 +310,8 @@ class JointBatch:
 
         Of the least damaged one, if several elements of the law can break.
         """
-        rows = [self._all(row) for row in self.law.tables.damage_rows]
+        places = map(self._engine.row, self.law.tables.damage_rows)
+        rows = [self._all(place) for place in places]
         return np.min([np.ones(self._n), *rows], axis=0)
 
     # --------------------------------------------------------------- internals
@@ -294,7 +319,7 @@ class JointBatch:
     def _row(self, name: str) -> Array:
         """A row of the states of all joints by name; zeros for a law without this row."""
         row = self.law.tables.first_rows.get(name)
-        return np.zeros(self._n) if row is None else self._all(row)
+        return np.zeros(self._n) if row is None else self._all(self._engine.row(row))
 
     def _all(self, rows: Any) -> Array:
         """Rows of the states of all joints, as a copy (n,) or (n, rows).
@@ -315,10 +340,10 @@ class JointBatch:
 
     def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
         """States (n, rows) of all joints or of the joints `index`, as a copy."""
-        rows = slice(self.law.state_size)
+        rows = slice(self._engine.state_rows)
         if index is None:
-            return self._all(rows)
-        return self._state[block_index(self._state, index, rows)]
+            return self._engine.unpack(self._all(rows))
+        return self._engine.unpack(self._state[block_index(self._state, index, rows)])
 
     def _index(self, where: Index) -> NDArray[np.intp]:
         index = np.asarray(where)
@@ -347,7 +372,7 @@ class JointBatch:
         largest effective closure of the law. Raises as `_closure_bound_by_joint`.
         """
         d = step.d
-        limit = self.law.max_effective_closure
+        limit = self._max_effective_closure
         if d.size <= MAX_SIZE_IN_PYTHON:  # the sum of sizes is a bound too; NaN if any is NaN
             largest = sum(map(abs, d.ravel().tolist()))
         else:
@@ -387,6 +412,20 @@ class JointBatch:
     def _closure_bounds_at(self, delta: Array) -> Array:
         """Bound (n,) of |y| of all facets of joints at delta (n, dim)."""
         return self._closure_per_displacement * np.abs(delta).max(axis=1)
+
+
+def _slider_dtype(value: DTypeLike) -> np.dtype[Any]:
+    """Validate the dtype of stored slider forces: numpy.float64 or numpy.float32."""
+    try:
+        dtype = np.dtype(value)
+    except TypeError:
+        dtype = None
+    if dtype not in (np.dtype(np.float64), np.dtype(np.float32)):
+        raise ValueError(
+            f"slider_dtype = {value!r} is not supported: slider forces are stored as numpy.float64 "
+            "or numpy.float32"
+        )
+    return dtype
 
 
 def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:

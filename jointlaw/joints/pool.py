@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from ..support.checks import integer
 from .batch import JointBatch
@@ -19,7 +19,7 @@ class JointPool:
     A key is any hashable object that names a contact while it lasts, such as the pair of its body
     numbers. `batch` holds the joints; `assign` and `add` return their places in it, for
     `batch.update(d, where=places)`. A released place is used for a later contact, whose joint
-    starts in the virgin state. law, track_dissipation: as in `JointBatch`.
+    starts in the virgin state. law, track_dissipation, slider_dtype: as in `JointBatch`.
 
     A host that stores the places of its contacts itself needs no keys, only `allocate` and
     `release`.
@@ -29,8 +29,10 @@ class JointPool:
     >>> F, _ = pool.batch.update(np.full((2, 3), 1e-8), where=places)
     """
 
-    def __init__(self, law: Any, track_dissipation: bool = True) -> None:
-        self.batch = JointBatch(law, 0, track_dissipation)
+    def __init__(
+        self, law: Any, track_dissipation: bool = True, slider_dtype: DTypeLike = np.float64
+    ) -> None:
+        self.batch = JointBatch(law, 0, track_dissipation, slider_dtype)
         self._place: dict[Hashable, int] = {}
         self._free: list[int] = []  # descending, so that pop() takes the lowest place
 
@@ -139,7 +141,8 @@ class JointPool:
                 f"keys name {len(place)} contacts, state holds {len(state)} joints: give the keys "
                 "that the pool had when the snapshot was taken"
             )
-        batch = JointBatch(self.batch.law, len(place), self.batch.track_dissipation)
+        old = self.batch
+        batch = JointBatch(old.law, len(place), old.track_dissipation, old.slider_dtype)
         batch.restore(state)
         self.batch = batch
         self._place = place

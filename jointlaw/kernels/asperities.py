@@ -24,8 +24,9 @@ the interlock decays, planes of facets rotate with slip, see interlock.py.
 """
 
 import math
+from copy import copy
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ from ..discretisation.first_loading_response import DegradingFacets, FirstLoadin
 from ..discretisation.tables import FacetTables, max_effective_closure
 from ..support.checks import Array
 from ..support.thresholds import (
-    FRICTION_TOLERANCE,
+    MAX_FLOAT_FORCE,
     MIN_CHORD_STEP,
     MIN_DIVISOR,
     ROUNDING_TOLERANCE,
@@ -49,6 +50,12 @@ from .degradation import (
     slope_energy_rate,
 )
 from .element import Element, ElementResponse, Measures
+from .float_sliders import (
+    DOUBLE_TOLERANCES,
+    FLOAT_TOLERANCES,
+    FrictionTolerances,
+    round_sliders,
+)
 from .interlock import (
     PlaneDerivatives,
     Planes,
@@ -102,9 +109,16 @@ class Sliders(NamedTuple):
 
 
 class AsperityElement(Element):
-    """Asperities that stick, slip and separate, with the options of the law."""
+    """Asperities that stick, slip and separate, with the options of the law.
+
+    k: tables of the facets. `float_sliders` says whether a step rounds the forces of sliders to
+    floats, for states that store them so (float_sliders.py).
+    """
 
     native_name = "asperities"
+
+    float_sliders = False
+    tolerances = DOUBLE_TOLERANCES
 
     def __init__(self, k: FacetTables) -> None:
         self.k = k
@@ -128,6 +142,23 @@ class AsperityElement(Element):
             "shear_work": (0.0, math.inf),
             "peak_contact_stress": (0.0, math.inf),
         }
+
+    def with_float_sliders(self) -> Self:
+        """The same element, whose steps round the forces of sliders to floats."""
+        rounding = copy(self)
+        rounding.float_sliders = True
+        rounding.tolerances = FLOAT_TOLERANCES
+        return rounding
+
+    @cached_property
+    def max_float_closure(self) -> float:
+        """Effective closure (m), a power of ten, up to which slider forces fit into floats."""
+        k = self.k
+        y = 10.0 ** np.arange(-300.0, 101.0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            force = k.mu * k.lam * float(np.sum(k.area / k.c1)) * k.curve.force(y)[0]
+        fits = np.flatnonzero(force <= MAX_FLOAT_FORCE)  # the force increases with y
+        return float(y[fits[-1]]) if fits.size else 0.0
 
     def numbers(self) -> dict[str, float]:
         """Scalars of `struct jlaw_law` that belong to asperities, by their names in C."""
@@ -193,7 +224,7 @@ class AsperityElement(Element):
         if k.degrades:
             updated.lost_slopes[:] = degrade_slopes(k, old)
             retention = updated.slope_retention
-            q, dissipated = degrade(k, delta, old, retention)
+            q, dissipated = degrade(k, delta, old, retention, self.tolerances)
         after_delta = delta + d
         end_retention = retention
         if k.degrades_by_stress:
@@ -222,10 +253,13 @@ class AsperityElement(Element):
             after = subtract_plastic(after, indented1)
 
         de = np.einsum("edmb,db->emb", middle.basis, d)[:, :, None]  # in the facet (2, M, 1, B)
-        sliders = load_sliders(k, before, increase, after, friction_limit(k, end.gamma), q, de)
+        limit = friction_limit(k, end.gamma)
+        sliders = load_sliders(k, before, increase, after, limit, q, de, self.tolerances)
         # squares of smaller forces underflow: such forces count as zero
         is_resolved = sliders.size**2 > MIN_DIVISOR
         updated.q[:] = np.where(is_resolved, sliders.scale, 0.0) * sliders.trial
+        if self.float_sliders:
+            updated.q[:] = round_sliders(old.q, updated.q, after_delta)
         F = sum_traction(k, end, after.force, updated.q)
 
         friction = friction_dissipation(k, before, after, q, sliders)
@@ -287,7 +321,7 @@ class AsperityElement(Element):
         cells = subtract_plastic(elastic, indented)
         limit = friction_limit(k, planes(k, delta[1:], now.slope_retention).gamma)
         q2 = now.q[0] ** 2 + now.q[1] ** 2
-        slips = is_at_limit(np.sqrt(q2), limit, cells.G, elastic.force)
+        slips = is_at_limit(np.sqrt(q2), limit, cells.G, elastic.force, self.tolerances)
         weight = (k.weight / k.weight.sum())[:, None]
         touches = cells.y > (now.indentation if k.yields else 0.0)
         sliding = np.sum(weight * (touches & np.all(slips, axis=1)), axis=0)
@@ -397,7 +431,11 @@ def shear_work(F0: Array, F: Array, d: Array) -> Array:
 
 
 def degrade(
-    k: FacetTables, delta: Array, old: AsperityState, slope_retention: Array
+    k: FacetTables,
+    delta: Array,
+    old: AsperityState,
+    slope_retention: Array,
+    tolerances: FrictionTolerances,
 ) -> tuple[Array, Array]:
     """Slider forces and dissipated energy after slopes decrease while the joint is at rest.
 
@@ -413,7 +451,7 @@ def degrade(
     mean = 0.5 * (k.area * k.c1)[:, None] * (before.force + after.force)
     normal = np.sum(mean * (before.y - after.y), axis=0)
     limit = friction_limit(k, planes(k, delta[1:], slope_retention).gamma)
-    q, dissipated = degrade_sliders(k, before, after, limit, old.q)
+    q, dissipated = degrade_sliders(k, before, after, limit, old.q, tolerances.beyond)
     # >= 0, but for rounding, because opposite facets have the same weight
     return q, dissipated + np.maximum(normal, 0.0)
 
@@ -426,6 +464,7 @@ def load_sliders(
     strength: Array,
     q: Array,
     de: Array,
+    tolerances: FrictionTolerances = DOUBLE_TOLERANCES,
 ) -> Sliders:
     """Trial forces of all sliders and their friction limits: steps 3 and 4 of `step`.
 
@@ -447,9 +486,10 @@ def load_sliders(
     trial = np.where(stiffens, q + a * chord * de, q * remaining + a * kappa1 * de)
     limit = strength * after.G
     size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
-    scale = np.divide(limit, size, out=np.ones_like(size), where=size > limit)
+    is_beyond = size > (1 + tolerances.beyond) * limit
+    scale = np.divide(limit, size, out=np.ones_like(size), where=is_beyond)
     force = k.curve.force(after.y)[0] if k.yields else after.force
-    slips = is_at_limit(size, strength, after.G, force)
+    slips = is_at_limit(size, strength, after.G, force, tolerances)
     return Sliders(trial, size, strength, limit, scale, chord, stiffens, is_small, slips)
 
 
@@ -464,12 +504,18 @@ def sum_traction(k: FacetTables, now: Planes, force: Array, q: Array) -> Array:
     return F + np.einsum("edmb,emb->db", now.basis, q.sum(axis=2)) / k.lam
 
 
-def is_at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
+def is_at_limit(
+    size: Array,
+    strength: Array,
+    G: Array,
+    force: Array,
+    tolerances: FrictionTolerances = DOUBLE_TOLERANCES,
+) -> Flags:
     """Whether sliders whose |q| is `size` are at their friction limit, but for rounding.
 
     force: Phi (M, B) of the first-loading curve, whose rounding error G has.
     """
-    tolerated = G * (1 - FRICTION_TOLERANCE) - ROUNDING_TOLERANCE * force[:, None]
+    tolerated = G * (1 - tolerances.below) - ROUNDING_TOLERANCE * force[:, None]
     return size >= strength * tolerated
 
 

@@ -68,18 +68,21 @@ def degrade_slopes(k: FacetTables, old: AsperityState) -> Array:
 
 
 def degrade_sliders(
-    k: FacetTables, before: Cells, after: Cells, strength: Array, q: Array
+    k: FacetTables, before: Cells, after: Cells, strength: Array, q: Array, beyond: float
 ) -> tuple[Array, Array]:
     """Slider forces q after slopes have decreased at rest, and dissipated energy (B,) in J/m2.
 
     As in a zero increment: springs that disengage release their force, and friction limits q.
+    beyond: relative to the friction limit, as in `FrictionTolerances`.
     """
     remaining = np.minimum(after.kappa * reciprocal(before.kappa), 1.0)
     remaining = np.where(after.kappa < before.kappa, remaining, 1.0)
     q2 = q[0] ** 2 + q[1] ** 2
     size = remaining * np.sqrt(q2)
     limit = strength * after.G
-    scale = remaining * np.divide(limit, size, out=np.ones_like(size), where=size > limit)
+    scale = remaining * np.divide(
+        limit, size, out=np.ones_like(size), where=size > (1 + beyond) * limit
+    )
     dissipated = q2 * (reciprocal(before.kappa) - scale**2 * reciprocal(after.kappa))
     return scale * q, np.sum(slider_compliance(k) * dissipated, axis=(0, 1))
 

@@ -10,6 +10,9 @@ instruction. A batch of one joint has a block of one. Joint i is in lane i % 8 o
 compiled law keeps more rows in a block than a state has: the first-loading curve of every facet at
 the end of the last step, which halves the evaluations of the next one. `refresh` computes these
 rows from the state, so snapshots do without.
+
+An engine for float sliders stores packed states (float_sliders.py), without the first-loading
+curve, since its states are to be small. `pack` and `unpack` convert states to rows of a block.
 """
 
 import ctypes
@@ -103,32 +106,33 @@ class Step:
         return self.__dict__ | {"call": (None, None, None)}  # a call holds addresses
 
 
-def engine(tables: LawTables) -> "NumpyEngine | NativeEngine":
+def engine(tables: LawTables, float_sliders: bool = False) -> "NumpyEngine | NativeEngine":
     """The engine of a law's tables. All its joints share it, because it keeps no state of theirs.
 
+    float_sliders: whether states store the forces of sliders as float.
     Raises ImportError where JOINTLAW_KERNEL requires a kernel that is not available.
     """
     choice = os.environ.get("JOINTLAW_KERNEL", "")
     if choice:
         one_of("JOINTLAW_KERNEL", choice, ("numpy", "native"))
-    return _engine(tables, choice)
+    return _engine(tables, choice, float_sliders)
 
 
 @lru_cache(maxsize=64)
-def _engine(tables: LawTables, choice: str) -> "NumpyEngine | NativeEngine":
+def _engine(tables: LawTables, choice: str, float_sliders: bool) -> "NumpyEngine | NativeEngine":
     if tables.python_only and choice == "native":
         raise ImportError(
             f"JOINTLAW_KERNEL = 'native', but the element {tables.python_only[0]} has no C version"
         )
     if tables.python_only or choice == "numpy":
-        return NumpyEngine(tables)
+        return NumpyEngine(tables, float_sliders)
     loaded = library.load()
     if loaded is not None:
-        return NativeEngine(tables, loaded)
+        return NativeEngine(tables, loaded, float_sliders)
     if choice == "native":
         raise ImportError(f"JOINTLAW_KERNEL = 'native', but {MISSING_LIBRARY}")
     _warn_once()
-    return NumpyEngine(tables)
+    return NumpyEngine(tables, float_sliders)
 
 
 @lru_cache(maxsize=1)
@@ -136,14 +140,39 @@ def _warn_once() -> None:
     warnings.warn(MISSING_LIBRARY, stacklevel=2)
 
 
-class NumpyEngine:
+class StateRows:
+    """Rows of a block that hold the state of a joint, with sliders as double or as float."""
+
+    def __init__(self, tables: LawTables, float_sliders: bool) -> None:
+        self.float_sliders = float_sliders
+        self._packing = tables.slider_packing if float_sliders else None
+        self.state_rows = tables.rows if self._packing is None else self._packing.packed_rows
+
+    def pack(self, states: Array) -> Array:
+        """Rows (n, state_rows) of a block for states (n, rows).
+
+        Raises ValueError for a slider force that does not fit into a float.
+        """
+        return states if self._packing is None else self._packing.pack(states)
+
+    def unpack(self, rows: Array) -> Array:
+        """States (n, rows) in rows (n, state_rows) of a block."""
+        return rows if self._packing is None else self._packing.unpack(rows)
+
+    def row(self, row: int) -> int:
+        """Row of a block for a row of a state that belongs to no slider."""
+        return row if self._packing is None else self._packing.packed_row(row)
+
+
+class NumpyEngine(StateRows):
     """The reference: `reference.step` for groups of joints."""
 
     name = "numpy"
 
-    def __init__(self, tables: LawTables) -> None:
-        self.tables = tables
-        self.rows = tables.rows  # of a block
+    def __init__(self, tables: LawTables, float_sliders: bool = False) -> None:
+        super().__init__(tables, float_sliders)
+        self.tables = tables.with_float_sliders if float_sliders else tables
+        self.rows = self.state_rows  # of a block
 
     def advance(self, state: Array, step: Step, track_dissipation: bool) -> None:
         """Advance joints by a step; the dissipated energy is always tracked."""
@@ -151,13 +180,13 @@ class NumpyEngine:
         for first in range(0, len(step.d), JOINTS_PER_NUMPY_CALL):
             part = slice(first, first + JOINTS_PER_NUMPY_CALL)
             index = block_index(state, joints[part])
-            old = np.ascontiguousarray(state[index].T)
+            old = np.ascontiguousarray(self.unpack(state[index]).T)
             new, F, C = reference.step(self.tables, old, step.d[part].T, step.C is not None)
             step.F[part] = F.T
             if step.C is not None and C is not None:
                 step.C[part] = np.moveaxis(C, 2, 0)
             if step.commit:
-                state[index] = new.T
+                state[index] = self.pack(new.T)
             if step.measures is not None:
                 dim = self.tables.dim
                 measures = reference.measures(self.tables, new)[:4]
@@ -173,16 +202,18 @@ class NumpyEngine:
 
         "traction" (n, dim) in Pa, "stiffness" (n,) in Pa/m or "measures" (n, 5).
         """
-        rows = np.ascontiguousarray(state[block_index(state, np.arange(n))].T)
+        states = self.unpack(state[block_index(state, np.arange(n))])
+        rows = np.ascontiguousarray(states.T)
         return np.array(getattr(reference, quantity)(self.tables, rows)).T
 
 
-class NativeEngine:
+class NativeEngine(StateRows):
     """The compiled law, on several threads if there are enough sliders."""
 
     name = "native"
 
-    def __init__(self, tables: LawTables, loaded: ctypes.CDLL) -> None:
+    def __init__(self, tables: LawTables, loaded: ctypes.CDLL, float_sliders: bool = False) -> None:
+        super().__init__(tables, float_sliders)
         numbers, arrays = pack(tables)
         # referenced here because the structure holds their addresses
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -200,8 +231,8 @@ class NativeEngine:
         self.lanes = library.vector_lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets; with plastic indentation,
         # Phi and Phi' at the indentation too
-        facets = 0 if tables.asperities is None else len(tables.asperities.c1)
-        self.rows = tables.rows + 2 * (1 + tables.yields) * facets
+        facets = 0 if tables.asperities is None or float_sliders else len(tables.asperities.c1)
+        self.rows = self.state_rows + 2 * (1 + tables.yields) * facets
 
     def advance(self, state: Array, step: Step, track_dissipation: bool) -> None:
         """Advance joints by a step; without `track_dissipation` it stays as it is in the state."""
@@ -254,7 +285,15 @@ class NativeEngine:
         _, rows, lanes = state.shape
         addresses = address(state), *arrays, *[None] * (6 - len(arrays))
         return library.BatchCall(
-            ctypes.addressof(self._law), *addresses, n, 0, n, rows, lanes == 1, self.lanes
+            ctypes.addressof(self._law),
+            *addresses,
+            n,
+            0,
+            n,
+            rows,
+            lanes == 1,
+            self.float_sliders,
+            self.lanes,
         )
 
     def _run(self, operation: int, call: library.BatchCall) -> None:

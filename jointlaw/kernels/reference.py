@@ -21,6 +21,7 @@ from ..native.layout import LARGEST_FLOAT
 from ..support.checks import Array
 from .asperities import AsperityElement
 from .element import Element, Measures
+from .float_sliders import SliderPacking
 from .interlock import first_touch
 
 
@@ -92,6 +93,30 @@ class LawTables:
         """Tables of the asperities, None for a law without asperities."""
         first = self.elements[0]
         return first.k if isinstance(first, AsperityElement) else None
+
+    @cached_property
+    def with_float_sliders(self) -> "LawTables":
+        """The same tables, whose steps round the forces of sliders to floats."""
+        elements = [
+            element.with_float_sliders() if isinstance(element, AsperityElement) else element
+            for element in self.elements
+        ]
+        return LawTables(self.dim, tuple(elements))
+
+    @cached_property
+    def max_closure_with_float_sliders(self) -> float:
+        """Effective closure (m) up to which forces are finite and slider forces fit into floats."""
+        elements = self.elements
+        limits = [element.max_effective_closure for element in elements]
+        limits += [e.max_float_closure for e in elements if isinstance(e, AsperityElement)]
+        return min(limits)
+
+    @cached_property
+    def slider_packing(self) -> SliderPacking:
+        """Packing of states whose slider forces are stored as float."""
+        if not any(isinstance(element, AsperityElement) for element in self.elements):
+            return SliderPacking(self.rows, self.rows, 0)
+        return SliderPacking(self.rows, self.first_rows["q"], self.row_counts["q"] // 2)
 
     @cached_property
     def python_only(self) -> list[str]:

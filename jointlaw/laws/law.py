@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from ..discretisation.first_loading_response import find_closure
 from ..discretisation.tables import VERSION
@@ -76,13 +76,14 @@ class Law:
         track_dissipation: bool = True,
         normal_stress: ArrayLike = 0.0,
         mated: ArrayLike = True,
+        slider_dtype: DTypeLike = np.float64,
     ) -> JointBatch:
         """A batch of n joints of this law, advanced together; they start as `joint` does.
 
-        track_dissipation: as of `JointBatch`; normal_stress: one for all or (n,), in Pa; mated: for
-        all or (n,). Raises ValueError as `joint` does.
+        track_dissipation, slider_dtype: as of `JointBatch`; normal_stress: one for all or (n,), in
+        Pa; mated: for all or (n,). Raises ValueError as `joint` and `JointBatch` do.
         """
-        batch = JointBatch(self, n, track_dissipation)
+        batch = JointBatch(self, n, track_dissipation, slider_dtype)
         is_unmated = ~booleans("mated", mated, n)
         stress = finite("normal_stress", normal_stress, "Pa")
         if is_unmated.any():

@@ -23,7 +23,8 @@
  * facets instead (JLAW_FACET_VECTORS). Both forms sum the facets in the same order and give the
  * same bits.
  *
- * This file is compiled several times: with -DJL_W=8, 4 and 2 for blocks of joints, and with
+ * This file is compiled several times: with -DJL_W=8, 4 and 2 for blocks of joints, with
+ * -DJLAW_FLOAT_SLIDERS too for blocks whose slider forces are floats (sliders.h), and with
  * -DJL_W=4 -DJLAW_FACET_VECTORS for contiguous states. -DKIND=_8 and the like is the suffix of the
  * table of functions.
  */

@@ -35,6 +35,7 @@ typedef struct {
       chunk; /* first joint that no thread has taken, 0 before a call; joints per grab */
   int rows;
   int contiguous; /* whether the state of a joint is contiguous, (n, rows) */
+  int float_sliders; /* whether forces of sliders are floats (sliders.h); not if contiguous */
   int lanes;      /* of a vector: at most jlaw_lanes(), and one of jlaw_levels() */
   int track_dissipation, commit;
 } jlaw_batch;

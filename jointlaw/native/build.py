@@ -205,8 +205,9 @@ class Unit(NamedTuple):
 def translation_units(levels: Iterable[int]) -> list[Unit]:
     """All sources of a library with the vector width and the defines of each.
 
-    batch.c is compiled twice per width in `levels` (doubles per vector): for joints side by side in
-    vectors, and for facets of one joint side by side.
+    batch.c is compiled three times per width in `levels` (doubles per vector): for joints side by
+    side in vectors, whose slider forces are stored as double or as float, and for facets of one
+    joint side by side.
     """
     baseline = min(LEVELS)
     identity = (f"-DJLAW_LEVELS={sum(levels)}", f'-DJLAW_SOURCES="{hash_sources()}"')
@@ -218,6 +219,8 @@ def translation_units(levels: Iterable[int]) -> list[Unit]:
     for lanes in levels:
         contiguous = ("-DJL_W=4", f"-DKIND=_{lanes}_contiguous", "-DJLAW_FACET_VECTORS")
         units.append(Unit(batch, lanes, (f"-DJL_W={lanes}", f"-DKIND=_{lanes}")))
+        floats = (f"-DJL_W={lanes}", f"-DKIND=_{lanes}_float", "-DJLAW_FLOAT_SLIDERS")
+        units.append(Unit(batch, lanes, floats))
         units.append(Unit(batch, lanes, contiguous))
     return units
 

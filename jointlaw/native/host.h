@@ -23,6 +23,11 @@
  * -ffast-math. -march=native compiles the law once, for this processor; without it gcc and clang
  * compile it for two kinds of x86-64 and choose at run time.
  *
+ * With JOINTLAW_FLOAT_SLIDERS, before this header in the file with JOINTLAW_IMPLEMENTATION, and
+ * before tables NAME.h, the forces of sliders are stored as float: states take about half of the
+ * memory, all arithmetic stays in double. Two floats take the place of one double of the state, so
+ * hosts copy states as before, but must not read numbers behind s[jlaw_dim].
+ *
  * The page "theory-incremental" of the documentation and jointlaw/kernels/asperities.py describe the
  * step, with the same symbols.
  */
@@ -41,6 +46,12 @@ extern "C" {
 
 #define JLAW_MESSAGE 300 /* bytes sufficient for every message */
 
+#ifdef JOINTLAW_FLOAT_SLIDERS
+#define JLAW_STORAGE ":float" /* ends the hash of a law, since states are not those with doubles */
+#else
+#define JLAW_STORAGE ""
+#endif
+
 typedef struct jlaw_law jlaw_law;
 
 #ifndef JOINTLAW_NO_FILES
@@ -51,7 +62,7 @@ void jlaw_free(jlaw_law *law);
 #endif
 
 /* Components of d: 3, 2 for motion in a plane, 1 for closure only. Numbers of a state, as in a snapshot
- * of the Python package */
+ * of the Python package; fewer with JOINTLAW_FLOAT_SLIDERS */
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law);
 JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law);
 
@@ -184,6 +195,10 @@ extern "C" {
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
+#ifdef JOINTLAW_FLOAT_SLIDERS
+#define JLAW_FLOAT_SLIDERS
+#endif
+
 /* Vectors of four facets, or, with JOINTLAW_SCALAR, other compilers and CUDA, one facet at a time with
  * the same bits. AVX2 is selected at run time if the processor supports it, unless the compiler may
  * use it anyway, or JOINTLAW_NO_DISPATCH switches the selection off. */
@@ -303,6 +318,46 @@ JLAW_MULTIVERSIONED JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s,
   jl_step_of_kind(law, n, d, F, C, JLAW_TRACKS_DISSIPATION, C != NULL, 0, NULL);
 }
 
+#ifdef JLAW_FLOAT_SLIDERS
+typedef union {
+  double number;
+  unsigned long long bits;
+} jlaw_pair_;
+typedef union {
+  float number;
+  unsigned int bits;
+} jlaw_half_;
+
+/* Read or write the pair of floats in a number of a state; pair[0]: q_s, pair[1]: q_t */
+static JLAW_FUNCTION void jlaw_read_pair_(const double *q, double pair[2])
+{
+  jlaw_pair_ both;
+  jlaw_half_ half;
+  both.number = *q;
+  for (int i = 0; i < 2; i++) half.bits = (unsigned int) (both.bits >> (32 * i)), pair[i] = half.number;
+}
+static JLAW_FUNCTION void jlaw_write_pair_(double *q, const double pair[2])
+{
+  jlaw_pair_ both;
+  jlaw_half_ half;
+  both.bits = 0;
+  for (int i = 0; i < 2; i++)
+    half.number = (float) pair[i], both.bits |= (unsigned long long) half.bits << (32 * i);
+  *q = both.number;
+}
+
+/* Whether all slider forces are finite; q: n pairs */
+static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
+{
+  double sum = 0.0;
+  for (int i = 0; i < n; i++) {
+    double pair[2];
+    jlaw_read_pair_(q + i, pair);
+    sum += fabs(pair[0]) + fabs(pair[1]);
+  }
+  return sum <= DBL_MAX;
+}
+#else
 /* Whether all slider forces are finite and of admissible size */
 static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
 {
@@ -313,6 +368,7 @@ static JLAW_FUNCTION int jlaw_sliders_are_valid_(const double *q, int n)
   for (; i < n; i++) sum[0] += q[i] * q[i];
   return (sum[0] + sum[1]) + (sum[2] + sum[3]) < JLAW_MAX_SLIDER_SQUARES;
 }
+#endif
 
 /* Whether energies, plastic indentations, degradation and damage of a state are valid for this law */
 static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double *s)
@@ -366,6 +422,20 @@ static JLAW_FUNCTION int jlaw_report_invalid_(const jlaw_law *law, const double 
   return -1;
 }
 
+/* Whether sliders can have forces that do not fit into a float at this effective closure */
+static JLAW_FUNCTION int jlaw_sliders_overflow_(const jlaw_law *law, double closure)
+{
+#ifdef JLAW_FLOAT_SLIDERS
+  double slope;
+  const double strength = law->mu / law->stiffness_ratio * law->stiffness_factor;
+  return law->asperities
+         && !(strength * jlaw_first_loading_at_(law, closure, &slope) <= JLAW_MAX_FLOAT_FORCE);
+#else
+  (void) law, (void) closure;
+  return 0;
+#endif
+}
+
 /* Whether jlaw_update accepts a state and a step; state_is_invalid: whether the state is the reason */
 static JLAW_FUNCTION int jlaw_step_is_valid_(const jlaw_law *law, const double *s, const double *d,
                                              int *state_is_invalid)
@@ -376,7 +446,8 @@ static JLAW_FUNCTION int jlaw_step_is_valid_(const jlaw_law *law, const double *
   *state_is_invalid =
       !(bound * distance <= law->max_effective_closure) || !jlaw_state_is_valid_(law, s);
   return !*state_is_invalid
-         && bound * (distance + step_size) <= law->max_effective_closure;
+         && bound * (distance + step_size) <= law->max_effective_closure
+         && !jlaw_sliders_overflow_(law, bound * (distance + step_size));
 }
 
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
@@ -595,22 +666,48 @@ static JLAW_FUNCTION void jlaw_rotate_elements_(const jlaw_law *law, double *s,
   }
 }
 
+/* Forces (q_s, q_t) of the slider of a cell; q: the sliders of a state */
+static JLAW_FUNCTION void jlaw_get_slider_(const jlaw_law *law, const double *q, int cell,
+                                           double force[2])
+{
+#ifdef JLAW_FLOAT_SLIDERS
+  (void) law;
+  jlaw_read_pair_(q + cell, force);
+#else
+  force[0] = q[cell], force[1] = q[law->facets * law->cells + cell];
+#endif
+}
+
+/* Store them, with JLAW_FLOAT_SLIDERS to the nearest float, zeros without a sign */
+static JLAW_FUNCTION void jlaw_set_slider_(const jlaw_law *law, double *q, int cell,
+                                           const double force[2])
+{
+#ifdef JLAW_FLOAT_SLIDERS
+  const double pair[2] = {jlaw_positive_zero_(force[0]), jlaw_positive_zero_(force[1])};
+  (void) law;
+  jlaw_write_pair_(q + cell, pair);
+#else
+  q[cell] = jlaw_positive_zero_(force[0]);
+  q[law->facets * law->cells + cell] = jlaw_positive_zero_(force[1]);
+#endif
+}
+
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   if (dim > 1) s[1] = jlaw_positive_zero_(-s[1]); /* shear along axis 2 */
-  double *qs = s + jl_slider_row(law), *qt = qs + M * D, *z = qt + M * D;
+  double *q = s + jl_slider_row(law), *z = s + jl_plastic_row(law);
   for (int f = 0; f < M; f++) {
     const int other =
         (int) jlaw_facet_value_(law, f, JLAW_MIRROR); /* f itself at a right angle to axis 2 */
     if (other < f) continue;                          /* already exchanged */
     for (int i = 0; i < D; i++) {
-      const double qs_f = qs[f * D + i];
-      const double qt_f = jlaw_positive_zero_(-qt[f * D + i]); /* t reverses */
-      qs[f * D + i] = qs[other * D + i];
-      qt[f * D + i] = jlaw_positive_zero_(-qt[other * D + i]);
-      qs[other * D + i] = qs_f;
-      qt[other * D + i] = qt_f;
+      double of_f[2], of_other[2];
+      jlaw_get_slider_(law, q, f * D + i, of_f);
+      jlaw_get_slider_(law, q, other * D + i, of_other);
+      of_f[1] = -of_f[1], of_other[1] = -of_other[1]; /* t reverses */
+      jlaw_set_slider_(law, q, f * D + i, of_other);
+      jlaw_set_slider_(law, q, other * D + i, of_f);
     }
     if (!law->yields) continue;
     const double z_f = z[f];
@@ -637,10 +734,43 @@ static JLAW_FUNCTION void jlaw_rotate_ring_(double *x, int n, int spacing, doubl
     }
 }
 
+/* Rotate the slider forces of the cells `cell` of n facets of one inclination, D cells from facet to
+ * facet */
+static JLAW_FUNCTION void jlaw_rotate_sliders_(const jlaw_law *law, double *s, int cell, int n,
+                                               double angle)
+{
+  const int D = law->cells;
+  double *q = s + jl_slider_row(law);
+#ifdef JLAW_FLOAT_SLIDERS
+  double force[2][JLAW_MAX_AZIMUTHS], rotated[2][JLAW_MAX_AZIMUTHS];
+  const unsigned long long key = jl_rounding_key(s, law->dim);
+  for (int j = 0; j < n; j++) {
+    double pair[2];
+    jlaw_get_slider_(law, q, cell + j * D, pair);
+    for (int i = 0; i < 2; i++) force[i][j] = rotated[i][j] = pair[i];
+  }
+  for (int i = 0; i < 2; i++) jlaw_rotate_ring_(rotated[i], n, 1, angle, 0);
+  for (int j = 0; j < n; j++) {
+    jl_real qs = jl_broadcast(rotated[0][j]), qt = jl_broadcast(rotated[1][j]);
+    jl_round_sliders(jl_rounding_noise(key, cell + j * D, 0, jl_broadcast(force[0][j]),
+                                       jl_broadcast(force[1][j])),
+                     &qs, &qt);
+    const double pair[2] = {JL_LANE(qs, 0), JL_LANE(qt, 0)};
+    jlaw_set_slider_(law, q, cell + j * D, pair);
+  }
+#else
+  jlaw_rotate_ring_(q + cell, n, D, angle, 0);
+  jlaw_rotate_ring_(q + law->facets * D + cell, n, D, angle, 0);
+#endif
+}
+
 /* Return sliders that exceed their friction limit to it */
 static JLAW_FUNCTION void jlaw_limit_sliders_(const jlaw_law *law, double *s)
 {
   const jl_states n = {s, 1, 0};
+#ifdef JLAW_FLOAT_SLIDERS
+  const jl_joint_bits key = jl_rounding_key(s, law->dim);
+#endif
   const int M = law->facets, D = law->cells;
   for (int at = 0; at < M; at += JL_FACETS_PER_PASS) {
     const int count = M - at < JL_FACETS_PER_PASS ? M - at : JL_FACETS_PER_PASS;
@@ -649,14 +779,21 @@ static JLAW_FUNCTION void jlaw_limit_sliders_(const jlaw_law *law, double *s)
     jl_evaluate_facets(law, n, at, &o);
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_FACET_LANES) {
       const int row = jl_slider_row(law) + at * D + i;
-      jl_real G, kappa, qs = jl_load(n, row, D, count), qt = jl_load(n, row + M * D, D, count);
+      jl_real G, kappa, qs, qt;
+      jl_load_sliders(law, n, row, D, count, &qs, &qt);
       jl_evaluate_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
       const jl_real limit = o.strength * G;
       const jl_real size = jl_sqrt(qs * qs + qt * qt);
-      const jl_mask exceeds = size > limit;
+      const jl_mask exceeds = size > JL_LIMIT_FACTOR * limit;
       const jl_real factor = jl_select(exceeds, limit / jl_select(exceeds, size, 1.0), 1.0);
-      jl_store(n, row, D, count, qs * factor + 0.0);
-      jl_store(n, row + M * D, D, count, qt * factor + 0.0);
+#ifdef JLAW_FLOAT_SLIDERS
+      const jl_bits noise = jl_rounding_noise(key, at * D + i, D, qs, qt);
+      qs = qs * factor, qt = qt * factor;
+      jl_round_sliders(noise, &qs, &qt);
+      jl_store_sliders(law, n, row, D, count, qs, qt);
+#else
+      jl_store_sliders(law, n, row, D, count, qs * factor + 0.0, qt * factor + 0.0);
+#endif
     }
   }
 }
@@ -675,16 +812,18 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
   jlaw_rotate_elements_(law, s, rotation);
   for (int f = 0, n; f < M; f += n) { /* inclinations */
     n = (int) jlaw_facet_value_(law, f, JLAW_RING_SIZE);
-    for (int i = 0; i < D; i++) {
-      jlaw_rotate_ring_(q + f * D + i, n, D, angle, 0);
-      jlaw_rotate_ring_(q + (M + f) * D + i, n, D, angle, 0);
-    }
+    for (int i = 0; i < D; i++) jlaw_rotate_sliders_(law, s, f * D + i, n, angle);
     if (law->yields) jlaw_rotate_ring_(z + f, n, 1, angle, 1);
   }
   jlaw_limit_sliders_(law, s);
   const double after = jlaw_measure_(law, s).sheared;
   if (after > before) /* interpolation must not add energy */
-    for (int i = 0; i < 2 * M * D; i++) q[i] = jlaw_positive_zero_(q[i] * sqrt(before / after));
+    for (int i = 0; i < M * D; i++) {
+      double force[2];
+      jlaw_get_slider_(law, q, i, force);
+      force[0] *= sqrt(before / after), force[1] *= sqrt(before / after);
+      jlaw_set_slider_(law, q, i, force);
+    }
   else s[dim] += before - after;
 }
 
@@ -779,7 +918,8 @@ static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
   char word[sizeof law->fingerprint];
   at = jlaw_read_word_(at, word, sizeof word);
   if (strcmp(word, "fingerprint")) return "its fingerprint is missing";
-  at = jlaw_read_word_(at, law->fingerprint, sizeof law->fingerprint);
+  at = jlaw_read_word_(at, law->fingerprint, sizeof law->fingerprint - sizeof JLAW_STORAGE);
+  strcat(law->fingerprint, JLAW_STORAGE);
   const char *error = jlaw_parse_scalars_(&at, law);
   if (error) return error;
   const size_t blocks = (size_t) (law->facets + JLAW_FACET_LANES - 1) / JLAW_FACET_LANES;

@@ -9,7 +9,7 @@
  * Rows of a state, in this order:
  *   delta (dim)          displacement from the interlocked (mated) position, m
  *   dissipated energy    J/m2
- *   q_s, q_t (M D each)  of all cells of all facets
+ *   q_s, q_t (M D each)  of all cells of all facets; as floats in M D rows: sliders.h
  *   z (M), plastic work  if asperities yield: plastic indentation of every facet (m), J/m2
  *   lost slopes          if asperities degrade: 1 - slope retention
  *   shear work           if it degrades asperities, J/m2
@@ -28,6 +28,8 @@
  * all compilers, vector widths and hosts give the same bits. The last digit of expm1 and pow depends
  * on the C library; exp and log are not used, because zig links versions of its own. */
 
+#include "sliders.h"
+
 typedef struct { /* constants of a step, which let the compiler omit unused parts */
   int dim, yields, interlock_decays, degrades, degrades_by_stress, tangent, track_dissipation;
   int curve_stored; /* whether Phi and Phi' are stored behind the state */
@@ -45,6 +47,9 @@ typedef struct {                /* a joint in a step */
    * degradation by stress */
   jl_joint_real slopes0, slopes1, slopes_middle, slopes_end;
   jl_joint_real retention_rate; /* derivative of slopes_end by the contact stress at fixed slopes */
+#ifdef JLAW_FLOAT_SLIDERS
+  jl_joint_bits rounding_key;
+#endif
 } jl_joint_step;
 
 typedef struct { /* planes of facets: slope along the azimuth e and across it, in axes (1, e) */
@@ -69,6 +74,9 @@ typedef struct {                  /* facets in a step; 0: before, 1: after */
   jl_real ws, wt, kappa_sum;                   /* v of the softening by z1; sum of kappa */
   jl_real us, ut;           /* sums over the cells of q before the step, after degradation */
   jl_real gs, gt, strength; /* derivative of q by log(gamma); mu lam A gamma */
+#ifdef JLAW_FLOAT_SLIDERS
+  jl_bits noise; /* random bits that round q of the present cell */
+#endif
 } jl_facet_step;
 
 typedef struct {                   /* the slider of one cell of facets in a step */
@@ -95,7 +103,7 @@ typedef struct { /* sums over facets */
 JL_INLINE int jl_slider_row(const jlaw_law *law) { return law->dim + 1; }
 JL_INLINE int jl_plastic_row(const jlaw_law *law)
 {
-  return law->dim + 1 + 2 * law->facets * law->cells;
+  return law->dim + 1 + JL_NUMBERS_PER_SLIDER * law->facets * law->cells;
 }
 JL_INLINE int jl_degradation_row(const jlaw_law *law)
 {
@@ -570,7 +578,7 @@ JL_INLINE void jl_degrade_sliders(const double *cell, jl_facet_step *o, const jl
   const jl_real compliance0 = jl_select_or_zero(stiff0, b * Q * r);
   const jl_real compliance1 = jl_select_or_zero(stiff1, a * Q * r);
   jl_real factor = jl_select(kappa > c->k0, c->k0 * compliance0, 1.0);
-  const jl_mask exceeds = factor * factor * q2 > limit2;
+  const jl_mask exceeds = factor * factor * q2 > JL_LIMIT_FACTOR * JL_LIMIT_FACTOR * limit2;
   factor = jl_select(exceeds, jl_sqrt(limit2 * (a * b * r)), factor);
   o->degradation_loss += q2 * (compliance0 - factor * factor * compliance1);
   *qs = factor * *qs;
@@ -606,14 +614,14 @@ JL_INLINE void jl_measure_facets(const jlaw_law *law, jl_states n, int at, const
   jl_real slides = jl_broadcast(1.0); /* 1 if all cells are at it */
   for (int i = 0; i < D && jl_any(o->y1 > jl_column(cell, JLAW_ZETA_START)); i++) {
     jl_real G, kappa;
-    const int row = jl_slider_row(law) + at * D + i;
-    const jl_real qs = jl_load(n, row, D, count), qt = jl_load(n, row + M * D, D, count);
+    jl_real qs, qt;
+    jl_load_sliders(law, n, jl_slider_row(law) + at * D + i, D, count, &qs, &qt);
     const jl_real q2 = qs * qs + qt * qt;
     jl_evaluate_cell(cell, o->y1, o->f1, o->k1, o->z1, o->fz1, o->kz1, law->yields, &G, &kappa);
     const jl_mask stiff = kappa > JLAW_MIN_DIVISOR;
     const jl_mask limited =
         jl_sqrt(q2)
-        >= o->strength * (G * (1.0 - JLAW_FRICTION_TOLERANCE) - JLAW_ROUNDING_TOLERANCE * o->f1);
+        >= o->strength * (G * (1.0 - JL_FRICTION_TOLERANCE) - JLAW_ROUNDING_TOLERANCE * o->f1);
     limited_G += jl_select_or_zero(limited, G);
     slides = jl_select_or_zero(limited, slides);
     sheared += jl_select_or_zero(stiff, q2 / jl_select(stiff, kappa, 1.0));
@@ -676,7 +684,8 @@ JL_INLINE void jl_map_to_friction_limit(const double *f, const jl_facet_step *o,
   c->tt = *qt + stiffness * o->et;
   c->trial2 = c->ts * c->ts + c->tt * c->tt;
   c->limit = c->strength * c->G1;
-  c->slips = c->trial2 > c->limit * c->limit;
+  const jl_real largest = JL_LIMIT_FACTOR * c->limit;
+  c->slips = c->trial2 > largest * largest;
   c->inv_size = jl_broadcast(0.0);
   c->return_factor = jl_broadcast(1.0);
   if (k.tangent || jl_any_to_compute(c->slips)) {
@@ -725,7 +734,7 @@ JL_INLINE void jl_add_slider_tangent(const double *f, const double *cell, const 
    * its limit slips */
   const jl_mask stiffer = (c->k1 > c->k0) & (o->dy > JLAW_ROUNDING_TOLERANCE * jl_abs(o->y1));
   const jl_real slip_force =
-      c->strength * (c->G1 * (1.0 - JLAW_FRICTION_TOLERANCE) - JLAW_ROUNDING_TOLERANCE * o->f1);
+      c->strength * (c->G1 * (1.0 - JL_FRICTION_TOLERANCE) - JLAW_ROUNDING_TOLERANCE * o->f1);
   const jl_mask limited =
       c->trial2 >= jl_max(slip_force, jl_broadcast(0.0)) * jl_max(slip_force, jl_broadcast(0.0));
   const jl_real vs = jl_select(stiffer, a * chord1 * o->es, decay * c->ts);
@@ -766,6 +775,9 @@ JL_INLINE void jl_step_cell(const double *f, const double *cell, jl_facet_step *
     o->ut += *qt;
   }
   jl_map_to_friction_limit(f, o, &c, qs, qt, k);
+#ifdef JLAW_FLOAT_SLIDERS
+  jl_round_sliders(o->noise, qs, qt);
+#endif
   o->qs += *qs;
   o->qt += *qt;
   if (k.track_dissipation) o->loss += jl_friction_loss(&c);
@@ -940,10 +952,13 @@ JL_INLINE void jl_step_facets(const jlaw_law *law, int at, const jl_joint_step *
     if (!jl_any((o.y0 > zeta) | (o.y1 > zeta) | (o.yw > zeta)))
       break; /* nor do deeper cells touch */
     const int row = k.dim + 1 + at * D + i;
-    jl_real qs = jl_load(n, row, D, count), qt = jl_load(n, row + M * D, D, count);
+    jl_real qs, qt;
+    jl_load_sliders(law, n, row, D, count, &qs, &qt);
+#ifdef JLAW_FLOAT_SLIDERS
+    o.noise = jl_rounding_noise(m->rounding_key, at * D + i, D, qs, qt);
+#endif
     jl_step_cell(f, cell, &o, &qs, &qt, k);
-    jl_store(n, row, D, count, qs);
-    jl_store(n, row + M * D, D, count, qt);
+    jl_store_sliders(law, n, row, D, count, qs, qt);
   }
   if (measures) jl_measure_facets(law, n, at, &o, measures);
   if (k.yields) {
@@ -995,6 +1010,9 @@ JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3
     m.from[i] = i < dim ? jl_load_joint(n, i) : jl_broadcast_joint(0.0);
     m.to[i] = m.from[i] + m.p[i];
   }
+#ifdef JLAW_FLOAT_SLIDERS
+  m.rounding_key = jl_rounding_key(m.to, dim);
+#endif
   m.slopes0 = m.slopes1 = jl_broadcast_joint(1.0);
   if (k.degrades) jl_degrade_slopes(law, n, &m, k);
   else if (k.degrades_by_stress) m.slopes0 = m.slopes1 = 1.0 - jl_load_joint(n, jl_degradation_row(law));
@@ -1164,9 +1182,10 @@ JL_INLINE void jl_traction(const jlaw_law *law, jl_states n, jl_joint_real F[3])
     if (law->yields) jl_subtract_plastic_force(o.y1, o.z1, o.fz1, &o.f1, &o.k1);
     o.qs = o.qt = jl_broadcast(0.0);
     for (int i = 0; i < D; i++) {
-      const int row = jl_slider_row(law) + at * D + i;
-      o.qs += jl_load(n, row, D, count);
-      o.qt += jl_load(n, row + M * D, D, count);
+      jl_real qs, qt;
+      jl_load_sliders(law, n, jl_slider_row(law) + at * D + i, D, count, &qs, &qt);
+      o.qs += qs;
+      o.qt += qt;
     }
     jl_add_facet_traction(law, f, &o.end, o.f1, o.qs, o.qt, dim, law->interlock_decays,
                           sum[at / JL_FACETS_PER_PASS % JL_PARTIAL_SUMS].F);

@@ -9,13 +9,15 @@
 
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 
-/* The function for `operation` (0 to 4: advance, measure, refresh, stiffness, traction) and this width */
-static jlaw_call *find_call(int lanes, int contiguous, int operation)
+/* The function for `operation` (0 to 4: advance, measure, refresh, stiffness, traction) on a batch */
+static jlaw_call *find_call(const jlaw_batch *b, int operation)
 {
-#define LEVEL(W)                                                                      \
-  if (lanes == W) {                                                                   \
-    extern jlaw_call *const jlaw_calls_##W[], *const jlaw_calls_##W##_contiguous[];   \
-    return (contiguous ? jlaw_calls_##W##_contiguous : jlaw_calls_##W)[operation];    \
+#define LEVEL(W)                                                                    \
+  if (b->lanes == W) {                                                              \
+    extern jlaw_call *const jlaw_calls_##W[], *const jlaw_calls_##W##_contiguous[], \
+        *const jlaw_calls_##W##_float[];                                            \
+    if (b->contiguous) return jlaw_calls_##W##_contiguous[operation];               \
+    return (b->float_sliders ? jlaw_calls_##W##_float : jlaw_calls_##W)[operation]; \
   }
 #if JLAW_LEVELS & 8
   LEVEL(8)
@@ -34,7 +36,7 @@ static jlaw_call *find_call(int lanes, int contiguous, int operation)
  * if no memory is left. */
 OUT int jlaw_run(jlaw_batch *b, int operation)
 {
-  jlaw_call *const call = find_call(b->lanes, b->contiguous, operation);
+  jlaw_call *const call = find_call(b, operation);
   const long long n = b->n, chunk = b->chunk;
   int failed = 0;
   for (long long at; !failed && (at = __atomic_fetch_add(&b->next, chunk, __ATOMIC_RELAXED)) < n;)

@@ -29,7 +29,14 @@ class BatchCall(ctypes.Structure):
         *((name, ctypes.c_longlong) for name in ("n", "next", "chunk")),
         *(
             (name, ctypes.c_int)
-            for name in ("rows", "contiguous", "lanes", "track_dissipation", "commit")
+            for name in (
+                "rows",
+                "contiguous",
+                "float_sliders",
+                "lanes",
+                "track_dissipation",
+                "commit",
+            )
         ),
     ]
 

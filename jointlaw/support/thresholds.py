@@ -19,3 +19,9 @@ FACTOR_CONVERGENCE = 4e-16  # relative change at which the search for slopes by 
 MAX_FACTOR_ITERATIONS = 100  # of this search, which takes two to six for elastic asperities
 MAX_SLIDER_SQUARES = 1e300  # sum over the sliders of a state: larger squares overflow in a step
 MAX_OFFSET_CURVATURE = 0.8587  # largest |d2o/dp2| mating lengths, at p = 1/2 of one: 1.5/1.25^2.5
+FLOAT_LIMIT_TOLERANCE = (
+    1.5e-7  # relative: rounding to a float, 2^-23, moves a force so far beyond it
+)
+FLOAT_FRICTION_TOLERANCE = 3e-7  # as FRICTION_TOLERANCE, for forces rounded to floats
+MIN_FLOAT = 1.17549435e-38  # smallest normal float, 2^-126, rounded down
+MAX_FLOAT_FORCE = 1e38  # Pa: larger forces of sliders are not stored as float

@@ -131,8 +131,9 @@ def header_text(law: Law, name: str, aperture: Aperture | None = None) -> str:
         parts.append(f"{_CONSTANT} jlaw_aperture {name}_aperture = {{{values}}};")
     values = ", ".join(map(repr, numbers.values()))
     tables = ", ".join(f"{name}_{key}" for key in arrays)
+    fingerprint = f'"{law.fingerprint}" JLAW_STORAGE'
     parts.append(
-        f'{_CONSTANT} jlaw_law {name} = {{{values},\n  {tables}, 0, "{law.fingerprint}"}};\n#endif'
+        f"{_CONSTANT} jlaw_law {name} = {{{values},\n  {tables}, 0, {fingerprint}}};\n#endif"
     )
     return "\n".join([*parts, ""])
 

@@ -11,6 +11,7 @@ by one; the bound is then replaced by the largest closure of the joints as they 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -146,7 +147,7 @@ class JointBatch:
         Raises ValueError for a wrong index.
         """
         index = None if where is None else self._index(where)
-        return JointState(self.law.fingerprint, self._rows(index))
+        return JointState(self.law.fingerprint, self._rows(index), self._engine.float_rows)
 
     def restore(self, state: JointState, where: Index | None = None) -> None:
         """Return to a snapshot; with `where` only these joints.
@@ -398,13 +399,15 @@ class JointBatch:
             joint = row if index is None else int(index[row])
             if not np.isfinite(d[row]).all():
                 raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
+            storage = " as float32" if limit < self.law.max_effective_closure else ""
             error = NonFiniteError(
-                f"joint {joint}: the step d = {d[row]} m gives a result that is not finite; "
-                "nothing was moved. Take a smaller step (state and d of this error repeat it)"
+                f"joint {joint}: the step d = {d[row]} m gives a result that is not finite"
+                f"{storage}; nothing was moved. Take a smaller step (state and d of this error repeat it)"
             )
             error.joint = joint
             error.d = d[row].copy()
-            error.state = JointState(self.law.fingerprint, self._rows(index)[[row]])
+            values = self._rows(index)[[row]]
+            error.state = JointState(self.law.fingerprint, values, self._engine.float_rows)
             raise error
         present = self._closure_bounds_at(self.delta).max(initial=0.0)
         return max(float(present), float(bounds.max(initial=0.0)))
@@ -416,16 +419,14 @@ class JointBatch:
 
 def _slider_dtype(value: DTypeLike) -> np.dtype[Any]:
     """Validate the dtype of stored slider forces: numpy.float64 or numpy.float32."""
-    try:
-        dtype = np.dtype(value)
-    except TypeError:
-        dtype = None
-    if dtype not in (np.dtype(np.float64), np.dtype(np.float32)):
-        raise ValueError(
-            f"slider_dtype = {value!r} is not supported: slider forces are stored as numpy.float64 "
-            "or numpy.float32"
-        )
-    return dtype
+    for dtype in (np.dtype(np.float64), np.dtype(np.float32)):
+        with suppress(TypeError):  # of a value that names no dtype
+            if value is not None and np.dtype(value) == dtype:
+                return dtype
+    raise ValueError(
+        f"slider_dtype = {value!r} is not supported: slider forces are stored as numpy.float64 or "
+        "numpy.float32"
+    )
 
 
 def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -4,6 +4,7 @@ import io
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from ..support.checks import Array
 from ..support.files import replace_file
 
 _VERSION = 1  # of the file, which holds the values with joints last
+_FLOAT_VERSION = 2  # of a file whose values of sliders are floats, in an array of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +20,14 @@ class JointState:
     """State of one joint or a batch, as `snapshot()` returns it.
 
     fingerprint: of the law that wrote it. values: (n, state_size), one row per joint, in the order
-    of `jointlaw.kernels.reference`, as `law.step` accepts them.
+    of `jointlaw.kernels.reference`, as `law.step` accepts them. float_rows: first and last + 1 row
+    of the slider forces if they are 32-bit floats (`slider_dtype` of `JointBatch`), which `save`
+    writes as such; None else.
     """
 
     fingerprint: str
     values: Array
+    float_rows: tuple[int, int] | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -48,7 +53,19 @@ class JointState:
     def save(self, path: str | Path) -> None:
         """Write the state to an NPZ file at `path`, atomically. Raises OSError where it cannot."""
         buffer = io.BytesIO()
-        np.savez(buffer, version=_VERSION, fingerprint=self.fingerprint, values=self.values.T)
+        values = self.values.T
+        if self.float_rows is None:
+            np.savez(buffer, version=_VERSION, fingerprint=self.fingerprint, values=values)
+        else:
+            first, end = self.float_rows
+            np.savez(
+                buffer,
+                version=_FLOAT_VERSION,
+                fingerprint=self.fingerprint,
+                values=np.delete(values, slice(first, end), axis=0),
+                floats=values[first:end].astype(np.float32),
+                first_float=first,
+            )
         replace_file(Path(path), buffer.getvalue())
 
 
@@ -77,14 +94,30 @@ def load_state(path: str | Path) -> JointState:
                 raise ValueError("not an NPZ file")
         with np.load(path, allow_pickle=False) as data:
             version = int(data["version"])
-            if version != _VERSION:
-                raise ValueError(f"its version is {version}, this jointlaw reads {_VERSION}")
+            if version not in (_VERSION, _FLOAT_VERSION):
+                raise ValueError(
+                    f"its version is {version}, this jointlaw reads {_VERSION} and {_FLOAT_VERSION}"
+                )
             fingerprint = str(data["fingerprint"])
-            values = data["values"]
-        if values.ndim != 2 or values.dtype.kind != "f":
-            raise ValueError("values is no table of numbers")
-        if not np.isfinite(values).all():
-            raise ValueError("values holds numbers that are not finite")
+            values = _table(data, "values")
+            float_rows = None
+            if version == _FLOAT_VERSION:
+                floats = _table(data, "floats")
+                first = int(data["first_float"])
+                if floats.shape[1:] != values.shape[1:] or not 0 <= first <= len(values):
+                    raise ValueError("floats does not fit to values")
+                float_rows = first, first + len(floats)
+                values = np.concatenate([values[:first], floats, values[first:]])
     except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not a saved joint state: {error}") from None
-    return JointState(fingerprint, np.array(values.T, float, order="C"))
+    return JointState(fingerprint, np.array(values.T, float, order="C"), float_rows)
+
+
+def _table(data: Any, name: str) -> Array:
+    """An array (rows, joints) of a file. Raises ValueError unless it is one of finite numbers."""
+    table: Array = data[name]
+    if table.ndim != 2 or table.dtype.kind != "f":
+        raise ValueError(f"{name} is no table of numbers")
+    if not np.isfinite(table).all():
+        raise ValueError(f"{name} holds numbers that are not finite")
+    return table

@@ -148,6 +148,14 @@ class StateRows:
         self._packing = tables.slider_packing if float_sliders else None
         self.state_rows = tables.rows if self._packing is None else self._packing.packed_rows
 
+    @property
+    def float_rows(self) -> tuple[int, int] | None:
+        """First and last + 1 row of a state that are stored as float; None for none."""
+        packing = self._packing
+        if packing is None:
+            return None
+        return packing.first, packing.first + 2 * packing.sliders
+
     def pack(self, states: Array) -> Array:
         """Rows (n, state_rows) of a block for states (n, rows).
 

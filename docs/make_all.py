@@ -64,6 +64,7 @@ PARTS = {
     "small-loads": Part(
         "docs/measure/random_laws.py small-loads --laws 4 --seed 5", page="accuracy.md"
     ),
+    "float-errors": Part("docs/measure/storage.py errors", page="accuracy.md"),
     "one-plane": Part("docs/measure/resolutions.py one-plane", quoted_in="accuracy.md"),
     "ablation-table": Part("docs/measure/blocks.py ablation-table", quoted_in="accuracy.md"),
     # validation.md
@@ -153,6 +154,7 @@ PARTS = {
     },
     # costs
     "cost-list": Part("docs/measure/resolutions.py cost-list", page="accuracy.md", is_timed=True),
+    "float-cost": Part("docs/measure/storage.py cost", page="accuracy.md", is_timed=True),
     "reduced-models": Part(
         "docs/measure/resolutions.py reduced-models", quoted_in="accuracy.md", is_timed=True
     ),

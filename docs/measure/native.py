@@ -103,6 +103,7 @@ def timing_library(folder, cc, *flags):
     subprocess.run([*command, str(source), "-o", str(target), "-lm"], check=True)
     library = ctypes.CDLL(str(target))
     library.jlaw_read.restype = ctypes.c_void_p
+    library.jlaw_state_size.argtypes = [ctypes.c_void_p]
     for function in (library.update_each, library.update_many):
         function.restype = ctypes.c_double
         function.argtypes = [*[ctypes.c_void_p] * 3, ctypes.c_long, ctypes.c_int]

@@ -402,7 +402,8 @@ class JointBatch:
             storage = " as float32" if limit < self.law.max_effective_closure else ""
             error = NonFiniteError(
                 f"joint {joint}: the step d = {d[row]} m gives a result that is not finite"
-                f"{storage}; nothing was moved. Take a smaller step (state and d of this error repeat it)"
+                f"{storage}; nothing was moved. Take a smaller step (state and d of this error "
+                "repeat it)"
             )
             error.joint = joint
             error.d = d[row].copy()

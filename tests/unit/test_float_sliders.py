@@ -125,7 +125,7 @@ def test_increments_far_below_the_resolution_of_a_float_are_not_lost():
         loaded = np.abs(q) > 1e-3 * np.abs(q).max()
         per_step = np.abs(sliders_of(joints)[0] - q)[loaded] / steps
         assert (per_step < 0.5 * np.spacing(np.abs(q[loaded]).astype(FLOAT))).all()
-    # a random walk of each slider by sqrt(float interval x path), 4 % of the path, over sqrt(sliders)
+    # a random walk of each slider by sqrt(interval x path), 4 % of the path, over sqrt(sliders)
     assert changes[np.float64] > 0.0
     assert abs(changes[FLOAT] - changes[np.float64]) < 0.03 * changes[np.float64]
 

@@ -4,6 +4,9 @@
  * 2 and 3 span the joint. SI units. A state has STATE numbers. The last one is 0 before the first
  * step and 1 after it; the others are the numbers of jointlaw.h and of a snapshot in Python. Hosts
  * start with zeros: they represent START, the joint under the seating stress, without shear. */
+#ifdef JOINTLAW_FLOAT_SLIDERS /* hosts show, interpolate and print each number of a state */
+#error "finite elements keep states of doubles: compile without JOINTLAW_FLOAT_SLIDERS"
+#endif
 #include "granite.h"
 #include <float.h>
 #include <math.h>

@@ -501,8 +501,9 @@ void PairJointlaw::init_style()
     warned_count = joints_of->deleted_under_load();    // joints in a restart file were reported before
   }
   if (joints_of->laws != laws_hash)
-    error->all(FLERR, "pair_style jointlaw: there are joints of other laws than in pair_coeff; "
-               "a state fits only the law that wrote it");
+    error->all(FLERR, "pair_style jointlaw: there are joints of other laws than in pair_coeff, or of "
+               "a plug-in with other storage (JOINTLAW_FLOAT_SLIDERS); a state fits only the law and "
+               "the storage that wrote it");
   joints_of->after_run = [this] {
     is_last_check = true;
     check_joints();

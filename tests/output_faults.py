@@ -198,8 +198,11 @@ def picture_faults(source):
             yield source.replacement("pictures", one, f"(-1 * ({source.source(one)}))")
         if len(data) >= 2:
             yield source.exchange("pictures", *data[:2])
+    docstrings = {node.value for node in ast.walk(source.tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(source.tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if node in docstrings:
+                continue
             match = UNIT_IN_LABEL.search(node.value)
             is_short = node.lineno == node.end_lineno
             if match and is_short and f"({match[1]})" in source.source(node):
@@ -289,12 +292,18 @@ def state_faults():
     """Entries of saved states that are not restored."""
     import kinds
 
-    from dem_demo.dynamics import simulation
+    from dem_demo import Simulation
+    from dem_demo.space.simulation import SpaceSimulation
 
     source = Source("dem_demo/dynamics/simulation.py")
-    for path in simulation.STATE:
-        line = f"\n            if path == {path!r}:\n                continue"
-        yield source.insertion("state", "for path in STATE:", line, f"{path} is not restored")
+    for kind in (Simulation, SpaceSimulation):
+        for path in kind.state_paths:
+            line = (
+                f"\n            if path == {path!r} and type(self).__name__ == {kind.__name__!r}:"
+                "\n                continue"
+            )
+            what = f"{path} of {kind.__name__} is not restored"
+            yield source.insertion("state", "for path in self.state_paths:\n", line, what)
     source = Source("dem_demo/contact/joints.py")
     for node in ast.walk(source.tree):
         if isinstance(node, ast.FunctionDef) and node.name == "restore":

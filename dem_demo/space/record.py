@@ -261,9 +261,9 @@ def contact_mesh(joints: dict[str, np.ndarray]):
         if name not in ("blocks", "contact", "at", "law")
     }
     of_points["shear_m"] = np.linalg.norm(joints["shear_m"], axis=1)
-    return meshio.Mesh(
-        joints["at"],
-        [("polygon", np.arange(a, b)[None]) for a, b in zip(first, last, strict=True)],
-        point_data=of_points,
-        cell_data={name: [row[None] for row in column] for name, column in cell_columns.items()},
-    )
+    cells = [("polygon", np.arange(a, b)[None]) for a, b in zip(first, last, strict=True)]
+    data = {name: [row[None] for row in column] for name, column in cell_columns.items()}
+    if not cells:  # a file without any cells cannot be written
+        cells = [("polygon", np.zeros((0, 3), int))]
+        data = {name: [np.zeros(0)] for name in cell_columns}
+    return meshio.Mesh(joints["at"], cells, point_data=of_points, cell_data=data)

@@ -13,6 +13,7 @@ from matplotlib.colors import same_color, to_rgba
 from matplotlib.quiver import Quiver
 from PIL import Image
 from scene_text import block, coulomb, lines
+from scipy.ndimage import gaussian_filter
 
 import dem_demo.output.pictures as block_pictures
 import jointlaw as jl
@@ -21,7 +22,7 @@ from dem_demo.output.pictures import Pictures, curves
 from dem_demo.output.record import RunRecord
 from dem_demo.output.run import advance
 from dem_demo.scene.read import parse
-from jointlaw.calibration.aperture import FlowTest, fit_flow
+from jointlaw.calibration.aperture import FORMS, FlowTest, fit_flow
 from jointlaw.calibration.fit import fit_curves
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 from jointlaw.laboratory.record import TestRecord
@@ -182,7 +183,15 @@ def test_picture_of_a_fit(fit):
             is_open = same_color(drawn.get_markerfacecolor(), "w")
             assert is_open == (face == "w")
         assert axis.get_xlabel() == "shear displacement (mm)"
-        assert len(filled_between(axis)) == 2
+        bands = filled_between(axis)
+        curves = [line for line in axis.lines if line.get_linestyle() == "-"]
+        assert len(bands) == len(curves) == 2
+        for band, curve in zip(bands, curves, strict=True):  # each band is about its curve
+            x, y = curve.get_data()
+            assert [band[:, 0].min(), band[:, 0].max()] == pytest.approx([x.min(), x.max()])
+            for i in range(0, len(x), max(len(x) // 7, 1)):
+                at = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
+                assert at.min() - 1e-9 <= y[i] <= at.max() + 1e-9
     # the law's own curve: a joint of the fitted law, sheared as the test was
     own = result.law.joint()
     jl.direct_shear(own, 0.0, normal=1e6, steps=40)
@@ -191,6 +200,11 @@ def test_picture_of_a_fit(fit):
     x, y = drawn.get_data()
     expected = np.interp(1e-3 * x, record.shear - record.shear[0], record.shear_stress)
     np.testing.assert_allclose(1e6 * y, expected, atol=0.02 * expected.max())
+    drawn = next(line for line in opening.lines if line.get_linestyle() == "-")
+    x, y = drawn.get_data()
+    dilation = record.closure[0] - record.closure
+    expected = np.interp(1e-3 * x, record.shear - record.shear[0], dilation)
+    np.testing.assert_allclose(1e-3 * y, expected, atol=0.02 * np.abs(dilation).max())
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["1 MPa", "3 MPa, predicted"]
 
@@ -227,6 +241,76 @@ def test_picture_of_a_flow_test():
     assert over_stress.get_xlabel() == "normal stress (MPa)"
     assert over_stress.get_ylabel() == "hydraulic aperture (µm)"
     assert over_closure.get_xlabel() == "closure of the law (µm)"
+    closure = np.array([law.closure(one) for one in stress])  # on loading
+    curve_of = {line.get_label(): line.get_xydata() for line in over_stress.lines}
+    for name, curve in flow.curves.items():
+        expected = np.column_stack([1e-6 * stress[:5], 1e6 * curve[:5]])
+        drawn = curve_of["map, loading" if name not in FORMS else name]
+        np.testing.assert_allclose(drawn, expected, rtol=1e-9)
+    fitted_map = next(iter(flow.curves.values()))
+    unloading = np.column_stack([1e-6 * stress[5:], 1e6 * fitted_map[5:]])
+    np.testing.assert_allclose(curve_of["map, unloading"], unloading, rtol=1e-9)
+    by_closure = {line.get_label(): line.get_xydata() for line in over_closure.lines}
+    loading = by_closure["map, loading"]
+    np.testing.assert_allclose(loading[:, 0], 1e6 * closure[:5], rtol=1e-3)
+    np.testing.assert_allclose(loading[:, 1], 1e6 * fitted_map[:5], rtol=1e-9)
+    labels = [text.get_text() for text in over_closure.get_legend().get_texts()]
+    expected = {"map, loading", "map, unloading", "measured, fitted", "measured, predicted"}
+    assert expected <= {*labels}
+
+
+def test_picture_of_a_scan():
+    """A random surface that is steeper along the rows: summits, slopes, law and depths."""
+    spacing = 1e-4  # m
+    noise = np.random.default_rng(0).normal(size=(60, 80))
+    z = 1e-4 * gaussian_filter(noise, (4, 2))
+    fit = jl.from_surface(z, spacing=spacing)
+    surface, scale, directions, depths = fit.plot().axes
+    shaded, heights = surface.images
+    np.testing.assert_allclose(heights.get_array(), 1e6 * fit.heights_of_scan)
+    for image in (shaded, heights):
+        assert image.get_extent() == pytest.approx([0.0, 8.0, 0.0, 6.0])  # mm
+        assert image.origin == "lower"
+    (summits,) = surface.lines
+    row, column = fit.asperities.grid_indices.T
+    places = np.column_stack([0.1 * (column + 0.5), 0.1 * (row + 0.5)])
+    np.testing.assert_allclose(summits.get_xydata(), places)
+    assert summits.get_label() == f"{len(places)} summits"
+    texts = surface.get_xlabel(), surface.get_ylabel(), scale.get_ylabel()
+    assert texts == ("along the rows (mm)", "along the columns (mm)", "height (µm)")
+    lines = {line.get_label(): line.get_xydata() for line in directions.lines}
+    facets = lines["facets"]
+    slope = np.tan(np.radians(facets[:, 1]))
+    along_columns, along_rows = fit.asperities.slope.T
+    np.testing.assert_allclose(slope * np.cos(facets[:, 0]), along_rows, atol=1e-12)
+    np.testing.assert_allclose(slope * np.sin(facets[:, 0]), along_columns, atol=1e-12)
+    measured = lines["rms slope of the facets"]
+    rms = np.tan(np.radians(measured[[0, 18], 1]))
+    np.testing.assert_allclose(measured[[0, 18], 0], [0.0, np.pi / 2])
+    assert rms == pytest.approx(np.sqrt(np.mean([along_rows**2, along_columns**2], axis=1)))
+    of_law = lines["rms slope of the law"]
+    np.testing.assert_allclose(of_law[:, 0], measured[:, 0])
+    # two lobes: as steep on the whole, and steepest and gentlest in the same directions
+    assert of_law[:, 1].mean() == pytest.approx(measured[:, 1].mean(), rel=0.3)
+    assert np.corrcoef(of_law[:, 1], measured[:, 1])[0, 1] > 0.9
+    limit = 90 / fit.orientation.a
+    np.testing.assert_allclose(lines[f"90°/a = {limit:.0f}°"], of_law * [1, 0] + [0, limit])
+    assert directions.get_title() == "inclination (°) by direction from the rows"
+    (density,) = depths.lines
+    x, y = density.get_data()
+    assert x.max() == pytest.approx(1e6 * fit.asperities.depth.max())
+    assert (y >= 0).all()
+    below_deepest = fit.heights.cdf(fit.heights.overlap + fit.asperities.depth.max())
+    below_highest = fit.heights.cdf(fit.heights.overlap)
+    area = np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(x))
+    assert area == pytest.approx(below_deepest - below_highest, abs=0.02)
+    bars = depths.patches
+    assert sum(bar.get_height() * bar.get_width() for bar in bars) == pytest.approx(1.0)
+    middle = sum(bar.get_height() * bar.get_width() * (bar.get_x() + bar.get_width() / 2)
+                 for bar in bars)  # fmt: skip
+    assert middle == pytest.approx(1e6 * fit.asperities.depth.mean(), rel=0.1)
+    texts = depths.get_xlabel(), depths.get_ylabel()
+    assert texts == ("depth below the highest summit (µm)", "density (1/µm)")
 
 
 # ----------------------------------------------------------------------------------------- blocks

@@ -219,12 +219,11 @@ def _run_in_space(options: argparse.Namespace, scene: SpaceScene) -> None:
     result = statics.solve()
     _describe_in_space(statics, result)
     print("the scene has no [run] with an end: the run ends with the static equilibrium")
-    picture_format = _space_picture_format(options)
     has_vtk = options.vtk
-    if options.format and not picture_format and find_spec("meshio"):
+    if options.format and not _space_picture_format(options) and find_spec("meshio"):
         print("VTK files are written in place of pictures")
         has_vtk = True
-    space_output.write(statics, result, options.out, has_vtk, picture_format)
+    space_output.write(statics, result, options.out, has_vtk, options.format)
 
 
 def _space_picture_format(options: argparse.Namespace) -> str | None:

@@ -32,6 +32,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
     "sphinx.ext.mathjax",
+    "blocks_view",
     "browser",
     "claims",
     "commands",

@@ -12,6 +12,7 @@ face_laws  law and rough direction of each contact
 statics    static equilibrium, and blocks that have none
 drawing    what a picture shows: faces, edges, states, rough directions
 pictures   pictures by pyvista
+view       a page for the browser with blocks that turn with the mouse
 strength   factor of safety, and blocks that fail first
 blocks     blocks in motion
 manager    contact points while blocks move, and their identity in time

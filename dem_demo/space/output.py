@@ -12,8 +12,9 @@ from ..dynamics.relaxation import Verdict
 from ..output.folder import BLOCKS, clear_run
 from ..output.record import list_blocks, write_csv
 from .drawing import Drawing
-from .pictures import JOINTS_PULL, SpacePictures
+from .pictures import JOINTS_PULL, SpacePictures, has_pyvista
 from .statics import Equilibrium, Statics
+from .view import VIEW, page, scene_data
 
 SUMMARY_VERSION = 1
 VTK = "vtk"
@@ -49,7 +50,7 @@ def write(
     """Write the files of an equilibrium, and return the content of summary.json.
 
     Results of another run in the folder are replaced. vtk: whether to write VTK files, which needs
-    meshio. picture_format: of the pictures, which need pyvista; None for no pictures.
+    meshio. picture_format: of the pictures; None for neither pictures nor the page that turns.
     """
     clear_run(folder)
     summary = summarise(statics, result)
@@ -66,16 +67,24 @@ def write(
 def write_pictures(
     statics: Statics, result: Equilibrium, folder: Path, picture_format: str
 ) -> list[str]:
-    """Draw the blocks with the verdict on each, and the joints of a scene with rough directions,
-    its blocks pulled apart; return the names of the files. Needs pyvista."""
+    """Draw the blocks, and return the names of the files.
+
+    view.html turns with the mouse. With pyvista also pictures: the verdict on each block, and the
+    joints of a scene with rough directions, its blocks pulled apart.
+    """
     is_decided = result.verdict is not Verdict.NOT_DECIDED
     drawing = Drawing(statics, result.unstable, is_decided)
-    names = [f"start.{picture_format}"]
-    SpacePictures(drawing, with_hatching=False).write(folder / names[0], result.verdict.value)
+    text = f"Static analysis: {result.verdict.value}."
+    (folder / VIEW).write_text(page([scene_data(drawing, text)]), encoding="utf-8")
+    names = [VIEW]
+    if not has_pyvista():
+        return names
+    names.append(f"start.{picture_format}")
+    SpacePictures(drawing, with_hatching=False).write(folder / names[-1], result.verdict.value)
     if len(drawing.hatch):
         names.append(f"joints.{picture_format}")
         apart = SpacePictures(drawing, [drawing.pulled_apart(JOINTS_PULL)])
-        apart.write(folder / names[1], "pulled apart to show the joints")
+        apart.write(folder / names[-1], "pulled apart to show the joints")
     return names
 
 

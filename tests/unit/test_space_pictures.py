@@ -144,13 +144,15 @@ def test_lengths_of_scale_bars():
 
 
 def test_without_pyvista_a_run_says_so_and_writes_vtk_files(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("dem_demo.cli.has_pyvista", lambda: False)
+    for module in ("cli", "space.output"):
+        monkeypatch.setattr(f"dem_demo.{module}.has_pyvista", lambda: False)
     assert main(["wedge", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "they need pyvista: pip install 'jointlaw[view]'" in printed
     assert "VTK files are written in place of pictures" in printed
     assert (tmp_path / "vtk" / "blocks.vtu").exists()
     assert not list(tmp_path.glob("*.png"))
+    assert (tmp_path / "view.html").exists()
 
 
 # ------------------------------------------------------------------------------- drawn by pyvista
@@ -281,7 +283,7 @@ class TestDrawn:
         monkeypatch.setattr(SpacePictures, "write", write)
         assert main(["wedge-across", "--out", str(tmp_path)]) == 0
         assert json.loads((tmp_path / "summary.json").read_text())["files"] == [
-            "blocks.csv", "start.png", "joints.png"
+            "blocks.csv", "view.html", "start.png", "joints.png"
         ]  # fmt: skip
         assert [row[1:] for row in drawn] == [
             ("start.png", "without equilibrium"),

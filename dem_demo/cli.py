@@ -188,7 +188,8 @@ def _run_simulation(options: argparse.Namespace, sim: Simulation) -> None:
     has_pictures = options.format is not None and isinstance(sim.scene, Scene)
     _describe(sim, options.until, has_pictures)
     dt = sim.dt
-    record, summary = run(sim, options.out, options.until, options.format, options.vtk)
+    vtk = options.vtk or (isinstance(sim.scene, SpaceScene) and _replaces_pictures(options))
+    record, summary = run(sim, options.out, options.until, options.format, vtk)
     _report(sim, record, summary, dt)
 
 
@@ -219,11 +220,16 @@ def _run_in_space(options: argparse.Namespace, scene: SpaceScene) -> None:
     result = statics.solve()
     _describe_in_space(statics, result)
     print("the scene has no [run] with an end: the run ends with the static equilibrium")
-    has_vtk = options.vtk
-    if options.format and not _space_picture_format(options) and find_spec("meshio"):
-        print("VTK files are written in place of pictures")
-        has_vtk = True
-    space_output.write(statics, result, options.out, has_vtk, options.format)
+    vtk = options.vtk or _replaces_pictures(options)
+    space_output.write(statics, result, options.out, vtk, options.format)
+
+
+def _replaces_pictures(options: argparse.Namespace) -> bool:
+    """Whether VTK files replace pictures of blocks in space for want of pyvista; prints so."""
+    if not options.format or _space_picture_format(options) or not find_spec("meshio"):
+        return False
+    print("VTK files are written in place of pictures")
+    return True
 
 
 def _space_picture_format(options: argparse.Namespace) -> str | None:

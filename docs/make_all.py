@@ -106,6 +106,9 @@ PARTS = {
         "docs/draw/space.py FOLDER",
         pictures={name: name for name in ("wedge.png", "slope-3d-joints.png", "face-contact.png")},
     ),
+    "wedge-across": Part(
+        "-m dem_demo wedge-across --out FOLDER", pictures={"wedge.gif": "motion.gif"}
+    ),
     "envelopes": Part(
         "docs/draw/envelopes.py FOLDER",
         page="theory-incremental.md",

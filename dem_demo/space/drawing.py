@@ -24,10 +24,25 @@ MIN_FREE_SHARE = 0.05  # of the area: smaller resultants of free faces have no d
 
 @dataclass(frozen=True)
 class Motion:
-    """Displacements (n, 3) of the centroids in m, and rotations (n, 3, 3), from the drawing."""
+    """Displacements (n, 3) of the centroids in m, and rotations (n, 3, 3), from the drawing.
+
+    Displacements of removed blocks are NaN. shown (n,): lengths (m) that colours show, by default
+    of the displacements.
+    """
 
     displacement: np.ndarray
     rotation: np.ndarray
+    shown: np.ndarray | None = None
+
+    @property
+    def is_present(self) -> np.ndarray:
+        """Blocks (n,) that are not removed."""
+        return np.isfinite(self.displacement[:, 0])
+
+    @property
+    def distances(self) -> np.ndarray:
+        """Lengths (n,) in m that colours show."""
+        return np.linalg.norm(self.displacement, axis=1) if self.shown is None else self.shown
 
     def place(self, block: np.ndarray, centroid: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Present places (m, 3) of points (m, 3) as drawn, each fixed to a block (m,).

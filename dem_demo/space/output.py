@@ -8,13 +8,10 @@ import numpy as np
 
 from jointlaw.support.files import SUMMARY, write_json
 
-from ..dynamics.relaxation import Verdict
 from ..output.folder import BLOCKS, clear_run
 from ..output.record import list_blocks, write_csv
-from .drawing import Drawing
-from .pictures import JOINTS_PULL, SpacePictures, has_pyvista
+from .picture_files import equilibrium_drawings
 from .statics import Equilibrium, Statics
-from .view import VIEW, page, scene_data
 
 SUMMARY_VERSION = 1
 VTK = "vtk"
@@ -56,36 +53,16 @@ def write(
     summary = summarise(statics, result)
     write_blocks(statics, result, folder / BLOCKS)
     if picture_format:
-        summary["files"] += write_pictures(statics, result, folder, picture_format)
+        verdict = result.verdict.value
+        drawings = equilibrium_drawings(statics, result.unstable, verdict, picture_format)
+        for name, draw in drawings.items():
+            draw(folder / name)
+        summary["files"] += drawings
     if vtk:
         write_vtk(statics, result, folder / VTK)
         summary["files"] += [f"{VTK}/blocks.vtu", f"{VTK}/contacts.vtu"]
     write_json(folder / SUMMARY, summary)
     return summary
-
-
-def write_pictures(
-    statics: Statics, result: Equilibrium, folder: Path, picture_format: str
-) -> list[str]:
-    """Draw the blocks, and return the names of the files.
-
-    view.html turns with the mouse. With pyvista also pictures: the verdict on each block, and the
-    joints of a scene with rough directions, its blocks pulled apart.
-    """
-    is_decided = result.verdict is not Verdict.NOT_DECIDED
-    drawing = Drawing(statics, result.unstable, is_decided)
-    text = f"Static analysis: {result.verdict.value}."
-    (folder / VIEW).write_text(page([scene_data(drawing, text)]), encoding="utf-8")
-    names = [VIEW]
-    if not has_pyvista():
-        return names
-    names.append(f"start.{picture_format}")
-    SpacePictures(drawing, with_hatching=False).write(folder / names[-1], result.verdict.value)
-    if len(drawing.hatch):
-        names.append(f"joints.{picture_format}")
-        apart = SpacePictures(drawing, [drawing.pulled_apart(JOINTS_PULL)])
-        apart.write(folder / names[-1], "pulled apart to show the joints")
-    return names
 
 
 def write_blocks(statics: Statics, result: Equilibrium, path: Path) -> None:

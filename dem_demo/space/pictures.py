@@ -127,7 +127,8 @@ class SpacePictures:
         self.right = np.cross([0.0, 0.0, 1.0], self.eye)
         self.right /= np.linalg.norm(self.right)
         self.up = np.cross(self.eye, self.right)
-        distances = np.linalg.norm(self.motions[-1].displacement[drawing.is_free], axis=1)
+        distances = self.motions[-1].distances[drawing.is_free]
+        distances = distances[np.isfinite(distances)]
         solids = [drawing.solids[i] for i in np.flatnonzero(drawing.is_free)]
         size = float(np.median([solid.size for solid in solids])) if solids else drawing.size
         self.largest_distance = float(distances.max(initial=0.0))
@@ -136,7 +137,7 @@ class SpacePictures:
         self.length_factor, self.length_unit = (1e3, "mm") if is_small else (1.0, "m")
         ends = [self._project(self._vertices(motion)) for motion in self._extremes()]
         plane = np.concatenate(ends)
-        low, high = plane.min(axis=0), plane.max(axis=0)
+        low, high = np.nanmin(plane, axis=0), np.nanmax(plane, axis=0)
         margin = 0.02 * (high - low).max()
         self.low, self.high = low - margin, high + margin
         width, height = self.high - self.low
@@ -187,6 +188,8 @@ class SpacePictures:
         line_width = max(pixels * LINE_WIDTH, 1.0)
         self._add_blocks(pv, plotter, motion)
         block, ends = drawing.edges
+        is_present = motion.is_present
+        block, ends = block[is_present[block]], ends[is_present[block]]
         lines = self._lines(pv, block, ends, motion)
         plotter.add_mesh(lines, color=EDGE_COLOUR, line_width=line_width, name="edges")
         thick = {"line_width": 2.5 * line_width, "lighting": False}
@@ -195,7 +198,10 @@ class SpacePictures:
             outlined = self._lines(pv, block[is_marked], ends[is_marked], motion, 2)
             plotter.add_mesh(outlined, color=MARKED_COLOUR, name="marked", **thick)
         if self.has_hatching:
-            hatching = self._lines(pv, drawing.hatch_block, drawing.hatch, motion)
+            is_drawn = is_present[drawing.hatch_block]
+            hatching = self._lines(
+                pv, drawing.hatch_block[is_drawn], drawing.hatch[is_drawn], motion
+            )
             plotter.add_mesh(
                 hatching, color=ROUGH_COLOUR, line_width=1.5 * line_width, name="rough direction"
             )
@@ -216,14 +222,15 @@ class SpacePictures:
         for i, solid in enumerate(drawing.solids):
             if solid is None:
                 continue
-            for face in solid.faces:
+            for face in solid.faces if motion.is_present[i] else ():
                 faces += [len(face), *(start + vertex for vertex in face)]
                 block.append(i)
             start += len(solid.vertices)
-        mesh = pv.PolyData(self._vertices(motion), faces=faces)
+        vertices = np.nan_to_num(self._vertices(motion))  # no face uses the ones of removed blocks
+        mesh = pv.PolyData(vertices, faces=faces)
         mesh.cell_data["block"] = block
         mesh.cell_data["state"] = drawing.state[block]
-        distances = np.linalg.norm(motion.displacement, axis=1)
+        distances = motion.distances
         name = f"displacement ({self.length_unit})"
         mesh.cell_data[name] = self.length_factor * distances[block]
         colours = ListedColormap(list(STATE_COLOURS.values()))

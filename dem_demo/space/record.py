@@ -14,6 +14,7 @@ from jointlaw.support.progress import track
 from ..output.folder import BLOCKS, HISTORY
 from ..output.record import RunRecord, write_csv
 from .contacts import Surfaces
+from .picture_files import run_drawings
 from .simulation import SpaceSimulation
 
 VTK = "vtk"
@@ -179,13 +180,17 @@ def read_monitors(sim: SpaceSimulation) -> dict[str, float]:
 def write(
     record: SpaceRecord, summary: dict, folder: Path, picture_format: str | None, vtk: bool
 ) -> None:
-    """Write all files of a run; vtk: whether to write VTK files, which needs meshio.
+    """Write all files of a run: tables before pictures, which take longest.
 
-    picture_format: has no effect, blocks in space have no pictures.
+    picture_format: None for neither pictures nor the page that turns. vtk: whether to write VTK
+    files, which needs meshio.
     """
-    write_json(folder / SUMMARY, {**summary, "files": [HISTORY, BLOCKS]})
+    drawings = run_drawings(record, picture_format) if picture_format else {}
+    write_json(folder / SUMMARY, {**summary, "files": [HISTORY, BLOCKS, *drawings]})
     record.write_history(folder / HISTORY)
     record.write_blocks(folder / BLOCKS)
+    for name, draw in drawings.items():
+        draw(folder / name)
     if vtk:
         write_vtk(record, folder / VTK)
 

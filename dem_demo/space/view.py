@@ -4,7 +4,7 @@ The page needs no network and no library: `view.html` draws with WebGL what `sce
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,14 +81,23 @@ def scene_data(
             [block, *points]
             for block, points in zip(drawing.hatch_block.tolist(), places(ends), strict=True)
         ],
-        "frames": [
-            {
-                "time": float(times[i]),
-                "displacement": places(motions[i].displacement),
-                "quaternion": Rotation.from_matrix(motions[i].rotation).as_quat().round(6).tolist(),
-            }
-            for i in chosen.tolist()
+        "frames": [_frame(motions[i], float(times[i]), places) for i in chosen.tolist()],
+    }
+
+
+def _frame(motion: Motion, time: float, places: Callable[[np.ndarray], list]) -> dict[str, Any]:
+    """One frame: time (s), displacement and rotation of each block, None for a removed block, and
+    the largest displacement (m)."""
+    is_present = motion.is_present
+    rotations = np.where(is_present[:, None, None], motion.rotation, np.eye(3))
+    moved = places(np.nan_to_num(motion.displacement))
+    return {
+        "time": time,
+        "displacement": [
+            place if present else None for place, present in zip(moved, is_present, strict=True)
         ],
+        "quaternion": Rotation.from_matrix(rotations).as_quat().round(6).tolist(),
+        "largest": float(np.nanmax(motion.distances, initial=0.0)),
     }
 
 

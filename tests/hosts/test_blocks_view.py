@@ -1,5 +1,6 @@
 """The page of blocks in space in Chromium: it turns, pulls apart and plays what Python computed."""
 
+import csv
 import re
 
 import numpy as np
@@ -210,7 +211,7 @@ def test_the_time_slider_shows_the_frames_of_the_run(chromium, drawings, slide):
 
 
 def test_a_run_writes_the_page_and_it_is_small_and_loads_nothing(tmp_path, browser):
-    assert main(["wedge-across", "--out", str(tmp_path)]) == 0
+    assert main(["wedge-across", "--until", "0.3", "--out", str(tmp_path)]) == 0
     path = tmp_path / "view.html"
     text = path.read_text(encoding="utf-8")
     assert len(text.encode()) < MAX_BYTES
@@ -218,7 +219,15 @@ def test_a_run_writes_the_page_and_it_is_small_and_loads_nothing(tmp_path, brows
     browser.call("Page.navigate", url="about:blank")
     browser.call("Page.navigate", url=path.as_uri())
     browser.wait(f"{VIEW} && {VIEW}.dataset.state === 'ready'")
-    assert "Static analysis: without equilibrium." in browser.run("document.body.textContent")
+    text = browser.run("document.body.textContent")
+    assert "0.3 s of motion after a start without equilibrium." in text
+    last = browser.run(f"+{VIEW}.querySelector('.time input').max")
+    browser.run(f"{VIEW}.querySelector('.time input').oninput({{target: {{value: {last}}}}})")
+    message = browser.run(f"{VIEW}.querySelector('.message').textContent")
+    with (tmp_path / "blocks.csv").open(newline="") as file:
+        largest = max(float(row["displacement_m"]) for row in csv.DictReader(file))
+    shown, unit = re.search(r"displacement ([\d.]+) (m+)", message).groups()
+    assert float(shown) * {"mm": 1e-3, "m": 1.0}[unit] == pytest.approx(largest, rel=0.005)
     assert browser.run(f"{VIEW}.querySelector('.scenes').hidden")
     width = browser.run("document.documentElement.scrollWidth")
     assert width == browser.run("document.documentElement.clientWidth")  # nothing overflows

@@ -3,6 +3,7 @@
 Tests that draw need pyvista (`pip install 'jointlaw[view]'`), and are slow: it loads VTK.
 """
 
+import csv
 import json
 import re
 from importlib.util import find_spec
@@ -17,10 +18,13 @@ from scipy.spatial.transform import Rotation
 import dem_demo.space.pictures as space_pictures
 from dem_demo.cli import main
 from dem_demo.output.pictures import DISPLACEMENT_COLOURS
-from dem_demo.space import Statics, load, parse
+from dem_demo.output.run import run
+from dem_demo.space import SpaceSimulation, Statics, load, parse
 from dem_demo.space.contacts import Surfaces
 from dem_demo.space.drawing import Drawing, Motion, hatched
+from dem_demo.space.picture_files import drawing_of_run
 from dem_demo.space.pictures import STATE_COLOURS, SpacePictures, colour_limit, nice_length
+from dem_demo.space.view import page, scene_data
 
 ROUGH_LAW = """
 asperity_density = 1e4
@@ -143,14 +147,43 @@ def test_lengths_of_scale_bars():
     assert lengths == pytest.approx([0.5, 1.0, 2.0, 5.0, 20.0, 0.02])
 
 
+def test_places_of_a_run_are_its_vertices():
+    """The drawing, moved to each frame, beside the vertices of the record."""
+    scene = load("wedge-across")
+    record, _ = run(SpaceSimulation(scene), until=0.2, pictures=None)
+    drawing, motions = drawing_of_run(record)
+    number = int(np.flatnonzero(drawing.is_free)[0])
+    solid = drawing.solids[number]
+    first = record.surfaces.first_vertex[number]
+    for i in (0, len(record.times) - 1):
+        block = np.full(len(solid.vertices), number)
+        placed = motions[i].place(block, drawing.centroid, solid.vertices)
+        expected = record.vertices(i)[first : first + len(solid.vertices)]
+        np.testing.assert_allclose(placed, expected, atol=1e-12)
+    assert motions[-1].distances == pytest.approx(record.distances)
+    assert record.distances[number] > 0.01
+
+
+def test_removed_blocks_are_left_out(drawing, moved):
+    """Of the page for the browser; `TestDrawn` has the pictures."""
+    displacement = moved.displacement.copy()
+    displacement[1] = np.nan
+    gone = Motion(displacement, moved.rotation)
+    assert gone.is_present.tolist() == [True, False, True]
+    data = scene_data(drawing, "", motions=[drawing.as_drawn, gone], times=[0.0, 1.0])
+    assert data["frames"][1]["displacement"] == [[0.0] * 3, None, [0.0, 1e-3, 0.0]]
+    assert data["frames"][1]["largest"] == pytest.approx(1e-3)
+    assert "NaN" not in page([data])
+
+
 def test_without_pyvista_a_run_says_so_and_writes_vtk_files(tmp_path, capsys, monkeypatch):
-    for module in ("cli", "space.output"):
+    for module in ("cli", "space.picture_files"):
         monkeypatch.setattr(f"dem_demo.{module}.has_pyvista", lambda: False)
-    assert main(["wedge", "--out", str(tmp_path)]) == 0
+    assert main(["wedge", "--until", "0.05", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "they need pyvista: pip install 'jointlaw[view]'" in printed
     assert "VTK files are written in place of pictures" in printed
-    assert (tmp_path / "vtk" / "blocks.vtu").exists()
+    assert (tmp_path / "vtk" / "blocks_0000.vtu").exists()
     assert not list(tmp_path.glob("*.png"))
     assert (tmp_path / "view.html").exists()
 
@@ -216,6 +249,19 @@ class TestDrawn:
         finally:
             plotter.close()
 
+    def test_removed_blocks_have_no_cells(self, drawing, moved):
+        displacement = moved.displacement.copy()
+        displacement[1] = np.nan
+        gone = Motion(displacement, moved.rotation)
+        pictures = SpacePictures(drawing, [drawing.as_drawn, gone], by="displacement")
+        plotter = pictures.plotter(1, 100)
+        try:
+            assert {0, 2} == set(plotter.actors["blocks"].mapper.dataset.cell_data["block"])
+            assert {0, 2} == set(plotter.actors["edges"].mapper.dataset.cell_data["block"])
+            assert "marked" not in plotter.actors
+        finally:
+            plotter.close()
+
     def test_pixels_have_the_colour_of_the_state_at_the_place_of_the_block(self, drawing):
         pictures = SpacePictures(drawing)
         image = pictures.render(0, 800)
@@ -275,21 +321,33 @@ class TestDrawn:
 
     def test_commands_write_pictures(self, tmp_path, monkeypatch, capsys):
         drawn = []
-        monkeypatch.setattr(space_pictures, "PIXELS", 300)
 
-        def write(self, path, note=""):
+        def remember(self, path, note=""):
             drawn.append((self, path.name, note))
 
-        monkeypatch.setattr(SpacePictures, "write", write)
-        assert main(["wedge-across", "--out", str(tmp_path)]) == 0
+        monkeypatch.setattr(SpacePictures, "write", remember)
+        monkeypatch.setattr(SpacePictures, "animation", remember)
+        assert main(["wedge-across", "--until", "0.1", "--out", str(tmp_path)]) == 0
         assert json.loads((tmp_path / "summary.json").read_text())["files"] == [
-            "blocks.csv", "view.html", "start.png", "joints.png"
+            "history.csv", "blocks.csv", "view.html", "start.png", "joints.png", "final.png",
+            "motion.gif",
         ]  # fmt: skip
-        assert [row[1:] for row in drawn] == [
+        assert [row[1:] for row in drawn[:3]] == [
             ("start.png", "without equilibrium"),
             ("joints.png", "pulled apart to show the joints"),
+            ("final.png", "t = 0.10 s"),
         ]
         assert drawn[0][0].marked.sum() == 1
+        animation, name, times = drawn[3]
+        assert name == "motion.gif"
+        assert animation.by == "displacement"
+        assert times[0] == 0.0
+        assert times[-1] == pytest.approx(0.1, rel=0.01)
+        assert len(animation.motions) == len(times)
+        with (tmp_path / "blocks.csv").open(newline="") as file:
+            displacements = [float(row["displacement_m"]) for row in csv.DictReader(file)]
+        assert animation.motions[-1].distances == pytest.approx(displacements, abs=1e-12)
+        assert max(displacements) == pytest.approx(animation.max_distance)
         assert main(["strength-reduction", "wedge", "--out", str(tmp_path / "strength")]) == 0
         pictures, name, note = drawn[-1]
         assert name == "initiating.png"

@@ -13,6 +13,7 @@ statics    static equilibrium, and blocks that have none
 drawing    what a picture shows: faces, edges, states, rough directions
 pictures   pictures by pyvista
 view       a page for the browser with blocks that turn with the mouse
+picture_files  pictures of an equilibrium and of a run, as files
 strength   factor of safety, and blocks that fail first
 blocks     blocks in motion
 manager    contact points while blocks move, and their identity in time

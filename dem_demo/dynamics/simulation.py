@@ -49,6 +49,7 @@ FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
     "the blocks are in equilibrium": 0.7,
 }
 IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
+IDLE_SHARE = 1e-6  # of it: the stress of faces drawn on each other, which touch by rounding
 MAX_HALVINGS = 8  # of a time step that was chosen automatically
 FILE = "state.npz"
 VERSION = 14
@@ -314,12 +315,12 @@ class Simulation:
         """Time step (s): the scene's fraction of the limit, or a fraction for what can happen."""
         scene = self.scene
         limit = self.limit.current
-        if not np.isfinite(limit) or not self.limit.checked_stiffness.any():  # nothing touches yet
-            stiffness = max(
-                float(np.interp(IMPACT_STRESS, joints.curve["stress"], joints.curve["stiffness"]))
-                for joints in self.joints.by_law
-            )
-            limit = min(limit, self._impact_limit(stiffness))
+        impact_stiffness = max(
+            float(np.interp(IMPACT_STRESS, joints.curve["stress"], joints.curve["stiffness"]))
+            for joints in self.joints.by_law
+        )
+        if not np.isfinite(limit) or self._is_untouched(impact_stiffness):
+            limit = min(limit, self._impact_limit(impact_stiffness))
         if not np.isfinite(limit):
             raise SceneError("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
@@ -332,6 +333,14 @@ class Simulation:
         else:
             self.fraction_reason = driven if is_driven else resting
         return FRACTIONS_OF_LIMIT[self.fraction_reason] * limit
+
+    def _is_untouched(self, impact_stiffness: float) -> bool:
+        """Whether no joint bears a load yet, and all are softer than in an impact (Pa/m)."""
+        joints = self.joints
+        stiffness = joints.interpolate("stiffness", "closure", self.contacts.closure)
+        largest_stress = np.abs(joints.traction).max(initial=0.0)
+        is_idle = largest_stress < IDLE_SHARE * IMPACT_STRESS
+        return is_idle and stiffness.max(initial=0.0) < impact_stiffness
 
     def _impact_limit(self, stiffness: float) -> float:
         """Step limit (s) if every block were touched all around; stiffness (Pa/m): of joints."""

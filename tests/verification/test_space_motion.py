@@ -1,9 +1,15 @@
-"""Motion of blocks in space: sliding, free flight and spin, saved states, blocks that tip."""
+"""Motion of blocks in space: sliding, the law alone on an incline, seams, walls, free flight, saved
+states, blocks that tip."""
+
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from scene_text import block, coulomb, lines
+from scene_text import ROCK, block, coulomb, lines
+from scipy.special import ellipj
 
+from dem_demo.contact import tabulate_first_loading
 from dem_demo.scene import SceneError
 from dem_demo.space import SpaceSimulation, parse
 
@@ -55,6 +61,151 @@ def test_coulomb_block_on_an_incline(degrees, azimuth, end, tolerance):
     assert abs(sim.energy_balance.error) < 1e-5
 
 
+ROUGH = """\
+from = "jing-replica"
+mating_length = 2e-3
+closure_range = 2e-5
+resolution = "balanced"
+"""
+
+
+def slide_of_the_law(sim, law, gravity, steps):
+    """Path (steps, 3) of a point mass on one joint of the law and the same dashpots as a block on
+    its four contact points, from the state of a simulation at time 0."""
+    blocks = sim.blocks
+    area = sim.contacts.area.sum()
+    mass = blocks.inertia[1, 0]
+    directions = sim.contacts.directions[0] * [[1.0], [-1.0], [-1.0]]  # of closure, shears by it
+    share = sim.contacts.area / area
+    curve = tabulate_first_loading(law)
+    joint = law.joints(1)
+    joint.update((share @ sim.joints.delta)[None], tangent=False)
+    velocity = blocks.velocity[:3, 1].copy()
+    place = np.zeros(3)
+    path = []
+    for _ in range(steps):
+        place = place + sim.dt * velocity
+        rates = directions @ velocity
+        joint.update(sim.dt * rates[None], tangent=False)
+        traction = joint.F[0]
+        _, slipping, separated, _ = joint.measures()[:4]
+        stick = max(1.0 - slipping[0] - separated[0], 0.0)
+        stiffness = np.interp(traction[0], curve["stress"], curve["stiffness"]) * area / 4
+        critical = 8.0 * np.sqrt(stiffness * 0.5 * mass)  # of four points
+        dashpot = 0.05 * critical * rates * [1.0, stick, stick]
+        force = area * traction + dashpot
+        velocity = velocity + sim.dt * (gravity - directions.T @ force / mass)
+        path.append(place)
+    return np.array(path)
+
+
+@pytest.mark.slow
+def test_thin_rough_block_slides_as_its_law_alone():
+    """A block 1 mm high on a joint whose rough direction is at 45 degrees to the dip line veers, by
+    the law alone. The difference falls with the height, through the moments of the forces."""
+    degrees = 56.0
+    gravity = inclined(degrees, np.pi / 4)
+    differences = []
+    for height in (0.02, 1e-3):
+        text = block_on_bed(gravity, ROUGH, 0.25, (1.0, 1.0, height), run=THIN)
+        scene = parse(f"rough = -90.0\n{text}")  # axis 2 along x
+        density = 520.0 / height  # equal stress
+        thin = replace(scene.blocks[1], density=density)
+        sim = SpaceSimulation(replace(scene, blocks=(scene.blocks[0], thin)))
+        steps = round(0.25 / sim.dt)
+        alone = slide_of_the_law(sim, scene.laws["rock"], gravity, steps)
+        start = sim.blocks.motion[:3, 1].copy()
+        azimuths = {}
+        for i in range(steps):
+            sim.step()
+            path = sim.blocks.motion[:3, 1] - start
+            if i in (steps // 25, steps - 1):
+                azimuths[i] = np.degrees(np.arctan2(path[1], path[0]))
+        length = np.linalg.norm(path)
+        differences.append(np.linalg.norm(path - alone[-1]) / length)
+        assert length > 0.05
+        early, late = azimuths.values()
+        assert 42.5 < early < 43.9 < late < 44.9  # rougher along axis 3, as c < 0
+    assert differences[0] < 1e-4
+    assert differences[1] < 2e-6
+
+
+THIN = "fraction = 0.15\nskin = 0.02\nmax_overlap = 0.9\n"
+
+
+@pytest.mark.parametrize("cuts", [(0.9,), (0.31, 0.83, 1.4)])
+@pytest.mark.parametrize("rough", [False, True], ids=["coulomb", "rough"])
+def test_block_that_crosses_joints_of_its_bed(rough, cuts):
+    """A block that slides obliquely over the seams of its bed, beside the same on one plate.
+
+    Coulomb: the same path. A rough block keeps its dilation over a seam that it reaches in the run.
+    """
+    law = ROCK.replace("a = 3.0", "a = 3.0, b = -1.0, c = 0.3") if rough else coulomb(0.6, 2e9, 1e9)
+    gravity = inclined(47.0 if rough else 38.0, 0.35)
+    paths, lifts = [], []
+    for edges in ((), cuts):
+        ends = [-2.0, *edges, 8.0]
+        bed = list(pairwise(ends))
+        run = "fraction = 0.15\n"
+        text = block_on_bed(gravity, law, 0.6, (1.0, 1.0, 0.3), bed, run)
+        sim = SpaceSimulation(parse(f"rough = 0.0\n{text}"))
+        start = sim.blocks.motion[:3, -1].copy()
+        run_to(sim, 0.6)
+        path = sim.blocks.motion[:3, -1] - start
+        paths.append(path / sim.time**2)
+        lifts.append(path[2])
+        assert abs(sim.energy_balance.error) < 1e-4
+        assert path[0] > 0.2
+    difference = np.linalg.norm(paths[1] - paths[0]) / np.linalg.norm(paths[0])
+    if not rough:
+        assert difference < 1e-4
+    elif cuts == (0.9,):
+        assert difference < 1e-3
+        assert lifts[1] == pytest.approx(lifts[0], rel=2e-2)
+
+
+def wall(wide, high, law, run, gap=0.0):
+    """A dry wall of bricks 0.6 m wide in half-brick bond, `gap` (m) above the ground."""
+    text = f"rough = 0.0\n[laws.rock]\n{law}"
+    text += block("ground", box=[0.6 * wide + 2, 2.0, 0.5], at=[0.3 * wide, 0, -0.25], fixed=True)
+    for row in range(high):
+        for i in range(wide - row % 2):
+            at = [0.6 * i + 0.3 + 0.3 * (row % 2), 0.0, 0.3 * row + 0.15 + gap]
+            text += block(f"brick {row} {i}", box=[0.6, 0.3, 0.3], at=at)
+    return SpaceSimulation(parse(f"{text}[run]\n{run}"))
+
+
+WALL = coulomb(0.6, 2e9, 1e9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [WALL, ROCK], ids=["coulomb", "rough"])
+def test_297_bricks_stand(law):
+    sim = wall(17, 18, law, "end = 0.02\n")
+    assert len(sim.blocks.names) == 298
+    start = sim.blocks.motion[:3].copy()
+    run_to(sim, 0.02)
+    assert np.abs(sim.blocks.motion[:3] - start).max() < 1e-8
+    assert sim.verdict == "in equilibrium"
+    assert abs(sim.energy_balance.error) < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [WALL, ROCK], ids=["coulomb", "rough"])
+def test_dropped_bricks_keep_the_balance_of_energy(law):
+    """A wall of 27 bricks falls by 1 mm on the ground, and rests there half a second later."""
+    sim = wall(5, 6, law, "end = 0.3\nsettle = false\n", gap=1e-3)
+    start = sim.blocks.motion[:3].copy()
+    errors = []
+    while sim.time < 0.3:
+        sim.step()
+        errors.append(sim.energy_balance.error)
+    assert np.abs(errors).max() < 3e-4
+    fallen = sim.blocks.motion[2] - start[2]
+    assert (fallen[1:] < -9e-4).all()
+    assert sim.energy_balance.value["kinetic"] < 0.02 * sim.energy_balance.value["dashpots"]
+
+
 def rotor(spin, end=1.0, step=1e-3):
     """A free block of three different moments of inertia far above a fixed one, without gravity."""
     text = lines(gravity=[0.0, 0.0, 0.0]) + f"[laws.rock]\n{coulomb()}"
@@ -80,6 +231,71 @@ def test_free_flight_with_spin():
     cosine, sine = np.cos(angle), np.sin(angle)
     assert turned == pytest.approx(np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]))
     assert abs(sim.energy_balance.error) < 1e-12
+
+
+def test_torque_free_rotation_follows_elliptic_functions():
+    """The angular velocities of a free block about its axes are Jacobi's elliptic functions; the
+    angular momentum in space stays. The error is of second order in the time step."""
+    spin = np.array([1.0, 0.0, 0.5])
+    errors = []
+    for step in (4e-3, 2e-3):
+        sim = rotor(spin.tolist(), step=step)
+        blocks = sim.blocks
+        moments = blocks.inertia[1, 3:]
+        one, two, three = moments  # rising
+        start = blocks.axes[1].T @ spin  # of the axes, which have signs
+        energy = start**2 @ moments  # twice
+        square = start**2 @ moments**2
+        rate = np.sqrt((two - one) * (three * energy - square) / moments.prod())
+        modulus = (three - two) * (square - one * energy)
+        modulus /= (two - one) * (three * energy - square)
+        largest = np.sqrt((square - one * energy) / (two * (two - one)))
+        run_to(sim, 8.0)
+        sn, cn, dn, _ = ellipj(rate * sim.time, modulus)
+        sign = np.sign(start[0] * start[2])
+        expected = np.array([start[0] * dn, sign * largest * sn, start[2] * cn])
+        present = 0.5 * (blocks.motion[9:, 1] + blocks.velocity[3:, 1])
+        momentum = blocks.axes[1] @ (moments * present)
+        conserved = sim.initial_axes[1] @ (moments * start)
+        errors.append([np.abs(present - expected).max(), np.abs(momentum - conserved).max()])
+        assert abs(sim.energy_balance.total / sim.energy_balance.start - 1) < 1e-12
+    errors = np.array(errors) / [1.0, np.sqrt(square)]
+    assert errors[0].max() < 1e-4
+    assert (errors[1] < 0.3 * errors[0]).all()
+
+
+def test_a_spinning_top_precesses():
+    """A moment m g l about the horizontal axis normal to a symmetric top: it precesses steadily at
+    the rate of I1 W^2 cos a - I3 w W + m g l = 0, a its angle from the vertical."""
+    tilt, w, moment = 0.5, 30.0, 6000.0
+    axis = np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+    text = lines(gravity=[0.0, 0.0, 0.0]) + f"[laws.rock]\n{coulomb()}"
+    text += block("base", box=[1, 1, 1], fixed=True)
+    across = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])
+    frame = np.stack([across, [0.0, 1.0, 0.0], axis], axis=1)
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    corners = (signs * [0.5, 0.5, 0.2]) @ frame.T + [0.0, 0.0, 50.0]
+    one, three = 2600.0 * 0.4 * np.array([1.16, 2.0]) / 12  # moments of inertia
+    root = np.sqrt((three * w) ** 2 - 4 * one * np.cos(tilt) * moment)
+    precession = (three * w - root) / (2 * one * np.cos(tilt))
+    own = w - precession * np.cos(tilt)  # w is the angular velocity about the axis in space
+    spin = own * axis + [0.0, 0.0, precession]
+    text += block("top", corners=corners, spin=spin)
+    sim = SpaceSimulation(parse(f"{text}[run]\nend = 1.0\nstep = 2e-4\nskin = 0.2\n"))
+    blocks = sim.blocks
+    own_axis = int(np.abs(blocks.axes[1].T @ axis).argmax())
+    sign = np.sign(blocks.axes[1][:, own_axis] @ axis)
+    while sim.time < 1.0:
+        pointing = sign * blocks.axes[1][:, own_axis]
+        in_space = moment * np.cross(pointing, [0.0, 0.0, -1.0])
+        blocks.loads[1, 3:] = blocks.axes[1].T @ in_space
+        sim.step()
+    pointing = sign * blocks.axes[1][:, own_axis]
+    angle = precession * sim.time
+    assert np.arccos(pointing[2]) == pytest.approx(tilt, abs=5e-3)
+    turned = np.arctan2(pointing[1], pointing[0])
+    assert turned == pytest.approx(angle, abs=1e-4)
+    assert angle > 1.0
 
 
 def test_saved_state_continues_bit_for_bit(tmp_path):

@@ -17,7 +17,13 @@ import numpy as np
 
 from jointlaw import JointLaw, PathError, direct_shear
 from jointlaw.cli.command import Command, Option, option
-from jointlaw.cli.main import EXIT_INTERRUPTED, EXIT_INVALID_INPUT, Parser
+from jointlaw.cli.main import (
+    EXIT_INTERRUPTED,
+    EXIT_INVALID_INPUT,
+    EXIT_OUTPUT_CLOSED,
+    Parser,
+    discard_output,
+)
 from jointlaw.support.checks import remedy
 from jointlaw.support.files import SUMMARY, write_json
 from jointlaw.support.pyplot import FORMATS
@@ -74,13 +80,17 @@ examples:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status: 0, 2 for invalid input or a run that stopped with
-    an error, 130 after Ctrl-C."""
+    an error, 130 after Ctrl-C, 141 if the reader of the output has ended."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         options = _parse(words)
         if getattr(options, "force", None) is False:
             require_free(options.out)
         options.run(options)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        discard_output()
+        return EXIT_OUTPUT_CLOSED
     except KeyboardInterrupt as stop:
         print(f"dem_demo: {str(stop) or 'interrupted'}", file=sys.stderr)
         return EXIT_INTERRUPTED

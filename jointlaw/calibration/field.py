@@ -16,13 +16,25 @@ from ..support.checks import more_than, one_of
 
 ASSUMED = (
     "Assumed (not constrained by field values): contacts of asperities of 1 mm radius in rock of "
-    "G = 20 GPa and nu = 0.25, a gamma density of heights (alpha = 4, beta = 30 um), asperity "
-    "degradation over 1.25 mating lengths, no direction dependence. JRC and JCS must be values of "
+    "G = 20 GPa and nu = 0.25, a gamma density of heights (alpha = 4, beta = 30 um), {}, no "
+    "direction dependence. JRC and JCS must be values of "
     "a joint of this length: scale the values of a laboratory sample first (docs/field.md). "
     "Dilation is not fitted to Barton's: asperities of the law do not break, so most of the peak "
-    "strength above the basic friction is dilation, where Barton assumes half. The law holds near "
-    "this normal stress; for other stresses fit a closure and a shear test (jointlaw fit)."
+    "strength above the basic friction is dilation, where Barton assumes half. {}"
 )
+DEGRADATION = {  # by argument of from_field: what is assumed, and where the law holds
+    "work": (
+        "asperity degradation over 1.25 mating lengths",
+        "The law holds near this normal stress; for other stresses fit a closure and a shear test "
+        "(jointlaw fit).",
+    ),
+    "stress": (
+        "asperity degradation by a contact stress of JCS/4",
+        "The peak strength follows Barton's at other normal stresses too, within 1.5 degrees from "
+        "0.5 to 10 MPa for JRC 10 and JCS 100 MPa; cycles of shear do not degrade the asperities, "
+        "and the stiffness holds near this normal stress (docs/field.md).",
+    ),
+}
 # JCS over degradation stress. The peak then follows Barton's from 0.5 to 10 MPa within 1.5 degrees
 # (JRC 10, JCS 100 MPa), without degradation by work
 _JCS_OVER_DEGRADATION_STRESS = 4.0
@@ -33,6 +45,11 @@ _MAX_DISPLACEMENT_ERROR = 0.1  # relative, of the peak displacement
 _MAX_STIFFNESS_ERROR = 0.01  # relative, of the normal stiffness
 _MIN_ROUGHNESS_ANGLE = 1.0  # degrees
 _MAX_FRICTION_ANGLE = 80.0  # degrees
+
+
+def assumptions(degradation: str = "work") -> str:
+    """What `from_field` assumes with this degradation, and where its law holds: a sentence each."""
+    return ASSUMED.format(*DEGRADATION[degradation])
 
 
 def from_field(
@@ -48,7 +65,7 @@ def from_field(
     """The law with Barton's peak friction angle and peak displacement at one normal stress.
 
     The peak friction angle is met within 0.1 degrees, the peak displacement within 10 % and the
-    stiffness within 1 %. `ASSUMED` lists the assumptions for all other parameters.
+    stiffness within 1 %. `assumptions` lists the assumptions for all other parameters.
 
     Parameters
     ----------
@@ -79,7 +96,7 @@ def from_field(
     }
     for name, value in arguments.items():
         more_than(name, value, 0.0)
-    one_of("degradation", degradation, ("work", "stress"))
+    one_of("degradation", degradation, tuple(DEGRADATION))
     basic_angle = math.degrees(basic_friction)
     roughness_angle = jrc * math.log10(jcs / normal_stress)
     max_roughness_angle = _MAX_FRICTION_ANGLE - basic_angle

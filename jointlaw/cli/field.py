@@ -3,7 +3,13 @@
 import argparse
 import math
 
-from ..calibration.field import ASSUMED, from_field, peak_displacement, shear_past_peak
+from ..calibration.field import (
+    DEGRADATION,
+    assumptions,
+    from_field,
+    peak_displacement,
+    shear_past_peak,
+)
 from .command import (
     JSON,
     OUT,
@@ -19,16 +25,20 @@ from .command import (
 
 FIELD_VALUES = ("jrc", "jcs", "length", "normal_stress", "normal_stiffness", "basic_friction")
 _STRESS = quantity("Pa", positive=True)
-VALID_NEAR = (
-    "from field values: valid near a normal stress of {:.4g} MPa; for other stresses fit a closure "
-    "and a shear test (jointlaw fit)"
-)
+VALID_NEAR = {  # by --degradation; with the normal stress in MPa
+    "work": "from field values: valid near a normal stress of {:.4g} MPa; for other stresses fit a "
+    "closure and a shear test (jointlaw fit)",
+    "stress": "from field values: stiffness and displacements are valid near a normal stress of "
+    "{:.4g} MPa, peak strength also at others (docs/field.md); cycles of shear do not degrade the "
+    "asperities",
+}
 ORIGIN = {
     "mu": "from the basic friction angle",
     "a": "from JRC and JCS, by the peak friction angle",
     "asperity_density": "from the normal stiffness",
     "mating_length": "from Barton's peak displacement",
     "slope_wear": "assumed: over 1.25 mating lengths",
+    "degradation_stress": "assumed: JCS/4",
     **dict.fromkeys(("K", "lam", "eta", "alpha", "beta", "overlap"), "assumed"),
     **dict.fromkeys(("b", "c"), "assumed: no dependence on direction"),
 }
@@ -36,7 +46,7 @@ ORIGIN = {
 
 def _run(options: argparse.Namespace) -> None:
     values = {name: getattr(options, name) for name in FIELD_VALUES}
-    law = from_field(**values)
+    law = from_field(**values, degradation=options.degradation)
     barton_displacement = peak_displacement(options.jrc, options.length)
     roughness_angle = options.jrc * math.log10(options.jcs / options.normal_stress)
     barton_friction = math.degrees(options.basic_friction) + roughness_angle
@@ -54,9 +64,12 @@ def _run(options: argparse.Namespace) -> None:
         f"- normal stiffness {test.normal_stiffness / 1e9:.3g} GPa/m\n\n"
         f"Law: mu = {law.asperity.mu:.3g}, a = {law.orientation.a:.3g}, asperity_density = "
         f"{law.asperity_density:.3g} per m2, mating_length = {law.mating_length:.3g} m.\n\n"
-        f"{ASSUMED}\n"
+        f"{assumptions(options.degradation)}\n"
     )
-    about = new_about(options, (), (VALID_NEAR.format(options.normal_stress / 1e6),), ORIGIN)
+    valid_near = VALID_NEAR[options.degradation].format(options.normal_stress / 1e6)
+    other = {"work": "degradation_stress", "stress": "slope_wear"}[options.degradation]
+    origin = {name: text for name, text in ORIGIN.items() if name != other}
+    about = new_about(options, (), (valid_near,), origin)
     files: Contents = {
         "law.toml": law_text(law, about),
         "report.md": text,
@@ -115,6 +128,13 @@ COMMAND = Command(
             type=quantity("rad", positive=True),
             default="30deg",
             help="friction angle of the flat rock surface (default 30deg)",
+        ),
+        option(
+            "--degradation",
+            choices=tuple(DEGRADATION),
+            default="work",
+            help="what degrades the asperities: the work of shear, or the contact stress, by which "
+            "the peak follows Barton's at other normal stresses too (default work)",
         ),
         *OUT,
         JSON,

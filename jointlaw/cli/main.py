@@ -1,6 +1,7 @@
 """The command line `jointlaw`."""
 
 import argparse
+import os
 import re
 import shlex
 import sys
@@ -36,6 +37,7 @@ Quantities are typed with their unit: 10MPa, 2um, 30deg, 5GPa/m.
 EXIT_FAILED_TEST = 1
 EXIT_INVALID_INPUT = 2
 EXIT_INTERRUPTED = 130
+EXIT_OUTPUT_CLOSED = 141  # as of programs that SIGPIPE ends
 
 
 class Parser(argparse.ArgumentParser):
@@ -51,6 +53,16 @@ class Parser(argparse.ArgumentParser):
         raise ValueError(f"{message.removeprefix('argument ')} (help: {self.prog} --help)")
 
 
+def discard_output() -> None:
+    """Connect the standard output to nothing, after the reader of its pipe has ended.
+
+    The interpreter flushes it at exit, which would print an error.
+    """
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, sys.stdout.fileno())
+    os.close(nothing)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status (docs/api.md)."""
     words = sys.argv[1:] if arguments is None else arguments
@@ -60,7 +72,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.words = shlex.join(["jointlaw", *words])
         if getattr(options, "out", None) and not options.force:
             require_free(options.out)
-        return int(options.run(options) or 0)
+        status = int(options.run(options) or 0)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:  # the reader of a pipe, such as `head`, has ended
+        discard_output()
+        return EXIT_OUTPUT_CLOSED
     except KeyboardInterrupt:
         print(f"{name}: interrupted; no further files are written", file=sys.stderr)
         return EXIT_INTERRUPTED

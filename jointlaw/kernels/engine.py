@@ -99,11 +99,12 @@ class Step:
         self.measures = measures
         self.where = where
         self.commit = commit
-        # the states of the last call, the call, and the arrays that it refers to: `NativeEngine`
-        self.call: tuple[Array | None, Any, Any] = None, None, None
+        # the states of the last call, the call, its address, and the arrays that it refers to:
+        # `NativeEngine`
+        self.call: tuple[Array | None, Any, int, Any] = None, None, 0, None
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"call": (None, None, None)}  # a call holds addresses
+        return self.__dict__ | {"call": (None, None, 0, None)}  # a call holds addresses
 
 
 def engine(tables: LawTables, float_sliders: bool = False) -> "NumpyEngine | NativeEngine":
@@ -244,14 +245,19 @@ class NativeEngine(StateRows):
 
     def advance(self, state: Array, step: Step, track_dissipation: bool) -> None:
         """Advance joints by a step; without `track_dissipation` it stays as it is in the state."""
-        state_of_call, call, _ = step.call
+        state_of_call, call, call_address, _ = step.call
         if state_of_call is not state:
             arrays = step.d, step.F, step.C, step.measures, *self._sort_by_block(state, step.where)
             call = self._prepare_call(state, len(step.d), *map(address, arrays))
-            step.call = state, call, arrays
+            call_address = ctypes.addressof(call)
+            step.call = state, call, call_address, arrays
         call.track_dissipation = track_dissipation
         call.commit = step.commit
-        self._run(library.ADVANCE, call)
+        call.next = 0
+        if call.n * self._sliders <= MIN_SLIDERS_FOR_THREADS:
+            self._work(call_address, library.ADVANCE)
+        else:
+            self._run(library.ADVANCE, call)
 
     def refresh(self, state: Array, n: int) -> None:
         """Compute Phi and Phi' in the blocks of the first n states from these states."""

@@ -9,12 +9,14 @@
  */
 
 typedef struct { /* rows of one name in the state of a joint */
+  const char *name;
   int first, count, is_vector, is_damage;
   double lower, upper; /* bounds */
 } jl_rows;
 
 /* Number of rows of each element: jl_NAME_rows */
-#define JL_COUNT_ROWS(is_vector, is_damage, lower, upper) +((is_vector) ? law->dim - 1 : 1)
+#define JL_COUNT_ROWS(name, is_vector, is_damage, lower, upper) \
+  +((is_vector) ? law->dim - 1 : 1)
 #define JL_DEFINE_ROWS(name)                              \
   JL_INLINE int jl_##name##_rows(const jlaw_law *law)     \
   {                                                       \
@@ -28,7 +30,8 @@ JLAW_ELEMENTS(JL_DEFINE_ROWS)
 JL_INLINE int jl_list_rows(const jlaw_law *law, int row, jl_rows list[JLAW_ELEMENT_ROW_NAMES])
 {
   int n = 0;
-#define JL_LIST_ROWS(vector, damage, low, high)                        \
+#define JL_LIST_ROWS(row_name, vector, damage, low, high)              \
+  list[n].name = row_name;                                             \
   list[n].first = row, list[n].count = (vector) ? law->dim - 1 : 1;    \
   list[n].is_vector = (vector), list[n].is_damage = (damage);          \
   list[n].lower = (low), list[n].upper = (high), row += list[n++].count;

@@ -114,6 +114,11 @@ JLAW_FUNCTION void jlaw_contact_fractions(const jlaw_law *law, const double *s,
 /* Unsheared joint: normal stress (Pa) at a closure (m), and its inverse; NaN if there is no solution */
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure);
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress);
+/* Close a joint from the virgin state s to this normal stress (Pa, >= 0), without shear: writes the
+ * state and F (dim). One step to jlaw_closure misses the stress slightly if asperities yield or
+ * degrade by stress, because that closure is the limit of many steps; this function meets it to
+ * rounding. Returns 0, or -1 if no closure bears the stress: s is then virgin and F zero. */
+JLAW_FUNCTION int jlaw_preload(const jlaw_law *law, double *s, double normal_stress, double *F);
 /* Upper bound of |C| (Pa/m) as long as the effective closure of no facet exceeds `closure`. A time step
  * is stable if dt < 2 sqrt(mass/(area * bound)). */
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure);
@@ -211,8 +216,19 @@ extern "C" {
     && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)                           \
     && defined(JLAW_FACET_VECTORS) && !defined(JOINTLAW_NO_DISPATCH)
 #define JLAW_MULTIVERSIONED __attribute__((target_clones("avx2", "default")))
+#define JLAW_HAS_VERSIONS
 #else
 #define JLAW_MULTIVERSIONED
+#endif
+/* Each kind of a step is a function of its own: inlined into one function, they take 1.7 times the
+ * memory to compile. A function whose version is selected at run time is never inlined. */
+#if defined(__GNUC__) && !defined(__CUDACC__) && !defined(__CUDACC_RTC__)
+#ifdef JLAW_HAS_VERSIONS
+#define JL_STEP_FUNCTION JLAW_MULTIVERSIONED static
+#else
+#define JL_STEP_FUNCTION static __attribute__((noinline))
+#endif
+#define JM_STEP_FUNCTION static __attribute__((noinline))
 #endif
 #ifdef JOINTLAW_NO_DISSIPATION
 enum { JLAW_TRACKS_DISSIPATION = 0 };
@@ -293,6 +309,16 @@ static JLAW_FUNCTION void jlaw_append_number_(jlaw_message_ *text, double x)
     digits[n++] = (char) ('0' + exponent / unit % 10);
   digits[n] = 0;
   jlaw_append_(text, digits);
+}
+
+static JLAW_FUNCTION void jlaw_append_integer_(jlaw_message_ *text, int n)
+{
+  char digits[12];
+  int at = (int) sizeof digits - 1;
+  digits[at] = 0;
+  do digits[--at] = (char) ('0' + n % 10);
+  while (n /= 10);
+  jlaw_append_(text, digits + at);
 }
 
 /* ------------------------------------------------------------------------ the step */
@@ -385,7 +411,7 @@ static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double 
     valid = valid && peak >= 0.0 && peak <= DBL_MAX;
   }
   jl_rows rows[JLAW_ELEMENT_ROW_NAMES];
-  const int names = jl_list_rows(law, jl_element_row(law), rows);
+  const int names = jl_has_elements(law) ? jl_list_rows(law, jl_element_row(law), rows) : 0;
   for (int i = 0; i < names; i++)
     for (int j = rows[i].first; j < rows[i].first + rows[i].count; j++)
       valid = valid && s[j] >= rows[i].lower && s[j] <= rows[i].upper;
@@ -394,15 +420,70 @@ static JLAW_FUNCTION int jlaw_state_is_valid_(const jlaw_law *law, const double 
                                     jl_plastic_row(law) - jl_slider_row(law));
 }
 
+enum { JLAW_STATE_PARTS = 8 + JLAW_ELEMENT_ROW_NAMES };
+
+/* List the parts of a state in their order, by the names of a snapshot in Python, with the bounds of
+ * their numbers; returns how many */
+static JLAW_FUNCTION int jlaw_list_state_parts_(const jlaw_law *law, jl_rows parts[JLAW_STATE_PARTS])
+{
+  const int M = law->facets, D = law->cells;
+  const double delta = law->max_effective_closure / law->closure_per_displacement;
+  const jl_rows asperities[8] = {
+      {"delta", 0, law->dim, 0, 0, -delta, delta},
+      {"dissipated_energy", law->dim, 1, 0, 0, -DBL_MAX, DBL_MAX},
+      {"q", jl_slider_row(law), 2 * M * D, 0, 0, -DBL_MAX, DBL_MAX},
+      {"indentation", jl_plastic_row(law), law->yields * M, 0, 0, 0.0, law->max_effective_closure},
+      {"plastic_work", jl_plastic_row(law) + M, law->yields, 0, 0, -DBL_MAX, DBL_MAX},
+      {"lost_slopes", jl_degradation_row(law), jl_slopes_change(law), 0, 0, 0.0, 1.0},
+      {"shear_work", jl_degradation_row(law) + 1, law->degrades, 0, 0, 0.0, DBL_MAX},
+      {"peak_contact_stress", jl_peak_stress_row(law), law->degrades_by_stress, 0, 0, 0.0, DBL_MAX}};
+  int n = 0;
+  for (int i = 0; i < 8; i++)
+    if (asperities[i].count) parts[n++] = asperities[i];
+  return n + jl_list_rows(law, jl_element_row(law), parts + n);
+}
+
+/* Write which number of a state is out of bounds, its value and its bound */
+static JLAW_FUNCTION void jlaw_report_state_(const jlaw_law *law, const double *s,
+                                             jlaw_message_ *text)
+{
+  jl_rows parts[JLAW_STATE_PARTS];
+  const int n = jlaw_list_state_parts_(law, parts);
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < parts[i].count; j++) {
+      const double x = s[parts[i].first + j];
+      if (x >= parts[i].lower && x <= parts[i].upper) continue;
+      jlaw_append_(text, parts[i].name);
+      if (parts[i].count > 1) {
+        jlaw_append_(text, "[");
+        jlaw_append_integer_(text, j);
+        jlaw_append_(text, "]");
+      }
+      jlaw_append_(text, " (number ");
+      jlaw_append_integer_(text, parts[i].first + j);
+      jlaw_append_(text, ") of the state is ");
+      jlaw_append_number_(text, x);
+      if (x != x) return;
+      jlaw_append_(text, x > parts[i].upper ? ", above its bound " : ", below its bound ");
+      jlaw_append_number_(text, x > parts[i].upper ? parts[i].upper : parts[i].lower);
+      return;
+    }
+  /* each number is within its bounds: a sum of them is not */
+  if (!jlaw_sliders_are_valid_(s + jl_slider_row(law), jl_plastic_row(law) - jl_slider_row(law))) {
+    jlaw_append_(text, "q of the state has a sum of squares above ");
+    jlaw_append_number_(text, JLAW_MAX_SLIDER_SQUARES);
+  } else jlaw_append_(text, "delta of the state is too large");
+}
+
 static JLAW_FUNCTION int jlaw_report_invalid_(const jlaw_law *law, const double *s, const double *d,
                                               int state_is_invalid, char *message, size_t size)
 {
   jlaw_message_ text = {message, size, 0};
   int finite = 1;
   if (state_is_invalid) {
-    jlaw_append_(&text,
-                 "the state has numbers that are not finite or not valid for this law; the state "
-                 "is unchanged. Start from zeros or from a state that this law wrote");
+    jlaw_report_state_(law, s, &text);
+    jlaw_append_(&text, "; the state is unchanged. Start from zeros or from a state that this law "
+                        "wrote");
     return -1;
   }
   for (int i = 0; i < law->dim; i++) {
@@ -643,6 +724,39 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
     if (jlaw_normal_stress(law, middle) < normal_stress) low = middle;
     else high = middle;
   }
+}
+
+/* Close a virgin joint by one step; returns F[0] less the normal stress, and C[0] */
+static JLAW_FUNCTION double jlaw_close_virgin_(const jlaw_law *law, double *s, double closure,
+                                               double normal_stress, double *F, double *stiffness)
+{
+  const double d[3] = {closure, 0.0, 0.0};
+  double C[9];
+  for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
+  jlaw_step(law, s, 1, d, F, C);
+  *stiffness = C[0];
+  return F[0] - normal_stress;
+}
+
+JLAW_FUNCTION int jlaw_preload(const jlaw_law *law, double *s, double normal_stress, double *F)
+{
+  double closure = jlaw_closure(law, normal_stress), low = 0.0, high = law->max_search_closure;
+  const int has_solution = closure >= 0.0; /* not NaN */
+  for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
+  for (int i = 0; i < law->dim; i++) F[i] = 0.0;
+  if (!has_solution || closure == 0.0) return has_solution ? 0 : -1;
+  double stiffness, excess = jlaw_close_virgin_(law, s, closure, normal_stress, F, &stiffness);
+  if (!law->yields && !law->degrades_by_stress) return 0; /* one step is as good as many */
+  for (int i = 0; i < 200 && fabs(excess) > 1e-14 * normal_stress; i++) { /* rounding */
+    if (excess < 0.0) low = closure;
+    else high = closure;
+    double next = closure - excess / stiffness;
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (next == closure || !(next > low && next < high)) break; /* neighbouring numbers */
+    closure = next;
+    excess = jlaw_close_virgin_(law, s, closure, normal_stress, F, &stiffness);
+  }
+  return 0;
 }
 
 /* -------------------------------------------------------------- rotated axes */

@@ -692,12 +692,11 @@ JL_INLINE void jl_map_to_friction_limit(const double *f, const jl_facet_step *o,
     c->inv_size = jl_select_or_zero(c->trial2 > JLAW_MIN_DIVISOR, 1.0 / jl_sqrt(c->trial2));
     c->return_factor = jl_select(c->slips, jl_min(c->limit * c->inv_size, jl_broadcast(1.0)), 1.0);
   }
-  const jl_real factor = /* squares of smaller forces underflow: the force counts as zero */
-      jl_select_or_zero(c->trial2 > JLAW_MIN_DIVISOR, c->return_factor);
-  /* 0.0 makes a negative zero positive: a cell that no lane loads is skipped, so the sign of a zero
-   * would depend on the joints in the other lanes */
-  *qs = factor * c->ts + 0.0;
-  *qt = factor * c->tt + 0.0;
+  /* Squares of smaller forces underflow: the force counts as zero. This zero is positive, as it is in a
+   * cell that no lane loads, which is skipped: the sign does not depend on the joints in other lanes. */
+  const jl_mask is_loaded = (c->trial2 > JLAW_MIN_DIVISOR) & (c->limit > 0.0);
+  *qs = jl_select_or_zero(is_loaded, c->return_factor * c->ts);
+  *qt = jl_select_or_zero(is_loaded, c->return_factor * c->tt);
 }
 
 /* Energy that slip of the sliders, and springs that disengage under shear, dissipate; every term is
@@ -1027,11 +1026,13 @@ JL_INLINE void jl_step(const jlaw_law *law, jl_states n, const jl_joint_real d[3
   for (int i = 0; i < JL_PARTIAL_SUMS; i++) {
     for (int j = 0; j < 3; j++) sum[i].F[j] = jl_broadcast(0.0);
     for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = jl_broadcast(0.0);
-    sum[i].loss = sum[i].plastic_work = sum[i].degradation_normal = sum[i].degradation_sliders =
-        jl_broadcast(0.0);
-    sum[i].shear0[0] = sum[i].shear0[1] = jl_broadcast(0.0);
-    for (int j = 0; k.degrades_by_stress && j < 3; j++)
-      sum[i].by_retention[j] = sum[i].contact_rate[j] = jl_broadcast(0.0);
+    if (k.track_dissipation) sum[i].loss = jl_broadcast(0.0);
+    if (k.yields) sum[i].plastic_work = jl_broadcast(0.0);
+    if (k.degrades)
+      sum[i].degradation_normal = sum[i].degradation_sliders = sum[i].shear0[0] =
+          sum[i].shear0[1] = jl_broadcast(0.0);
+    if (!k.degrades_by_stress) continue;
+    for (int j = 0; j < 3; j++) sum[i].by_retention[j] = sum[i].contact_rate[j] = jl_broadcast(0.0);
     sum[i].slope_energy_rate = jl_broadcast(0.0);
   }
   jl_measure_sums measures[JL_PARTIAL_SUMS];
@@ -1240,7 +1241,9 @@ JL_INLINE jl_joint_real jl_stiffness_bound(const jlaw_law *law, jl_states n)
 #define JL_STEP_FUNCTION static __attribute__((noinline))
 #else
 #define JL_BATCH 0
+#ifndef JL_STEP_FUNCTION
 #define JL_STEP_FUNCTION JL_INLINE
+#endif
 #endif
 #define JL_DEFINE_STEP(name, tangent, measured, ...)                                               \
   JL_STEP_FUNCTION void jl_step_##name(const jlaw_law *law, jl_states n, const jl_joint_real d[3], \
@@ -1253,16 +1256,22 @@ JL_INLINE jl_joint_real jl_stiffness_bound(const jlaw_law *law, jl_states n)
     if (JL_BATCH && !track_dissipation && !k.degrades) jl_step(law, n, d, F, C, untracked, all);   \
     else jl_step(law, n, d, F, C, k, all);                                                         \
   }
+#if JL_BATCH
 #define JL_DEFINE_STEPS(name, ...)                   \
   JL_DEFINE_STEP(name, 0, 0, __VA_ARGS__)            \
   JL_DEFINE_STEP(name##_measured, 0, 1, __VA_ARGS__) \
   JL_DEFINE_STEP(name##_C, 1, 0, __VA_ARGS__)
+JL_DEFINE_STEPS(plane_degrading, 2, 0, 1, 1, 0)
+JL_DEFINE_STEPS(space_degrading, 3, 0, 1, 1, 0)
+#else
+#define JL_DEFINE_STEPS(name, ...)        \
+  JL_DEFINE_STEP(name, 0, 0, __VA_ARGS__) \
+  JL_DEFINE_STEP(name##_C, 1, 0, __VA_ARGS__)
+#endif
 JL_DEFINE_STEPS(plane, 2, 0, 0, 0, 0)
 JL_DEFINE_STEPS(plane_decaying, 2, 0, 1, 0, 0)
-JL_DEFINE_STEPS(plane_degrading, 2, 0, 1, 1, 0)
 JL_DEFINE_STEPS(space, 3, 0, 0, 0, 0)
 JL_DEFINE_STEPS(space_decaying, 3, 0, 1, 0, 0)
-JL_DEFINE_STEPS(space_degrading, 3, 0, 1, 1, 0)
 JL_DEFINE_STEPS(general, law->dim, law->yields, 0, 0, 0) /* asperities yield, or closure only */
 JL_DEFINE_STEPS(general_decaying, law->dim, law->yields, 1, law->degrades, law->degrades_by_stress)
 
@@ -1276,23 +1285,31 @@ JL_INLINE void jl_step_of_kind(const jlaw_law *law, jl_states n, const jl_joint_
   jl_joint_real from[3];
   for (int i = 0; i < dim; i++) from[i] = jl_load_joint(n, i);
   track_dissipation = track_dissipation || yields || degrades;
+#if JL_BATCH
+#define JL_STEP_MEASURED(name) \
+  else if (all) jl_step_##name##_measured(law, n, d, F, C, track_dissipation, curve_stored, all);
+#else
+#define JL_STEP_MEASURED(name)
+#endif
 #define JL_STEP(name)                                                                       \
   {                                                                                         \
     if (tangent) jl_step_##name##_C(law, n, d, F, C, track_dissipation, curve_stored, all); \
-    else if (JL_BATCH && all)                                                               \
-      jl_step_##name##_measured(law, n, d, F, C, track_dissipation, curve_stored, all);     \
+    JL_STEP_MEASURED(name)                                                                  \
     else jl_step_##name(law, n, d, F, C, track_dissipation, curve_stored, all);             \
   }
   if (law->interlock_decays
       && (yields || dim == 1 || law->degrades_by_stress || (degrades && !JL_BATCH)))
     JL_STEP(general_decaying)
   else if (yields || dim == 1) JL_STEP(general)
-  else if (JL_BATCH && dim == 2 && degrades) JL_STEP(plane_degrading)
+#if JL_BATCH
+  else if (dim == 2 && degrades) JL_STEP(plane_degrading)
+  else if (degrades) JL_STEP(space_degrading)
+#endif
   else if (dim == 2 && law->interlock_decays) JL_STEP(plane_decaying)
   else if (dim == 2) JL_STEP(plane)
-  else if (JL_BATCH && degrades) JL_STEP(space_degrading)
   else if (law->interlock_decays) JL_STEP(space_decaying)
   else JL_STEP(space)
+#undef JL_STEP_MEASURED
 #undef JL_STEP
   if (!jl_has_elements(law)) return;
   const jl_joint_real stored =

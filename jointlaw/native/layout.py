@@ -213,12 +213,13 @@ def layout_h() -> str:
         "  char fingerprint[80];",
         "};",
         f"#define JLAW_ELEMENTS(X) {' '.join(f'X({name})' for name in ELEMENTS)}",
-        "/* State rows of an element: X(1 for a vector, 1 for damage, lower, upper bound) */",
+        "/* State rows of an element: X(name, 1 for a vector, 1 for damage, lower, upper bound) */",
         *(
             f"#define JLAW_ROWS_OF_{name}(X) "
             + " ".join(
-                f"X({int(row.is_vector)}, {int(row.is_damage)}, {row.lower!r}, {row.upper!r})"
-                for row in rows.values()
+                f'X("{row_name}", {int(row.is_vector)}, {int(row.is_damage)}, {row.lower!r}, '
+                f"{row.upper!r})"
+                for row_name, row in rows.items()
             )
             for name, rows in ELEMENTS.items()
         ),

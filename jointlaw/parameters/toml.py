@@ -52,7 +52,14 @@ def _lines(values: Any, kinds: Kinds, path: str, shown: Mapping[str, Any]) -> li
     lines = [f'kind = "{names[0]}"'] if names[0] != next(iter(kinds)) else []
     inner: list[str] = []
     defaults = {item.name: item.default for item in fields(values)}
-    for name, declaration in parameters_of(values).items():
+    declared = parameters_of(values)
+    for item in fields(values):
+        if item.init and item.name not in declared:
+            raise ValueError(
+                f"{path} = {values!r}: {item.name} of {type(values).__name__} is no declared "
+                "parameter, so no file can hold it: declare it by jl.parameter() (CONTRIBUTING.md)"
+            )
+    for name, declaration in declared.items():
         value = shown.get(name, getattr(values, name))
         if value is None or value == defaults[name]:
             continue

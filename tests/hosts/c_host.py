@@ -34,6 +34,7 @@ def library(folder, *flags, cc="cc", more=""):
     pointer = ctypes.c_void_p
     for function in ("normal_stress", "closure", "max_stiffness"):
         getattr(lib, f"jlaw_{function}").argtypes = [pointer, ctypes.c_double]
+    lib.jlaw_preload.argtypes = [pointer, pointer, ctypes.c_double, pointer]
     lib.jlaw_rotate.argtypes = [pointer, pointer, ctypes.c_double]
     for function in (
         "normal_stress",
@@ -75,6 +76,15 @@ class CLaw:
             assert (F == 4711.0).all()
             raise ValueError(self.message.value.decode())
         return F, C
+
+    def preload(self, normal_stress):
+        """Close the virgin joint to a normal stress; returns F. Raises ValueError if it cannot."""
+        F = np.full(self.dim, 4711.0)
+        if self.lib.jlaw_preload(self.law, at(self.state), normal_stress, at(F)):
+            assert not F.any()
+            assert not self.state.any()
+            raise ValueError("no closure bears this normal stress")
+        return F
 
     def measures(self):
         """Fractions sliding, slipping and separated; stored and dissipated energy."""

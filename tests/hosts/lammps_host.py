@@ -45,6 +45,7 @@ LAWS = {
         mating_length=5e-4, resolution="fast",
     ),
     "worn": soft(slope_wear=50.0, slope_residual=0.2),
+    "degrading": soft(degradation_stress=1e6),  # by the contact stress
     "bonded": soft(bond=jl.Bond(K, K, T, 2 * T, energy_I=4 * T**2 / (2 * K))),
     "coulomb": jl.CoulombLaw(K, K / 2, 0.6, cohesion=T, tension=T, residual_cohesion=0.0),
     "plane": soft(plane=0.0),

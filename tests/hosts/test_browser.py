@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Chromium
+from kinds import make_law
 from programs import run_program
 
 import jointlaw as jl
@@ -118,6 +119,37 @@ def test_a_drag_gives_the_bits_of_python(chromium, preset):
     slid = F[np.flatnonzero(d[:, 1])]
     assert slid[:, 0] == pytest.approx(10e6, rel=1e-8)  # the bracket ends at 1e-9
     assert np.ptp(slid[:, 1]) > 3e6
+
+
+@pytest.mark.parametrize("more", [{}, {"damage": {"yield_interference": 2e-7}}])
+def test_a_law_that_degrades_by_stress_gives_the_bits_of_python(chromium, more):
+    """Closed, sheared under a growing stress, and unloaded: the slopes decrease on the way."""
+    law = make_law(mating_length=2e-6, degradation_stress=5e7, **more)
+    rng = np.random.default_rng(8)
+    d = rng.normal(0.0, 1e-7, (60, 3))
+    d[0, 0] = 5e-7
+    d[-10:, 0] = -8e-8
+    table = list(export.tables(law))
+    bits = chromium.run(
+        f"(() => {{ const joint = new Joint(test.joint.wasm, new Uint8Array({table}));"
+        "const numbers = [];"
+        f"for (const d of {d.tolist()}) {{"
+        "  joint.trial(d); joint.commit(); numbers.push(...joint.out); }"
+        "const words = new BigUint64Array(new Float64Array(numbers).buffer);"
+        "return Array.from(words, (b) => b.toString(16)); })()"
+    )
+    results = np.array([int(b, 16) for b in bits], np.uint64).view(float).reshape(-1, 12)
+    joint = law.joint()
+    for step, values in zip(d, results, strict=True):
+        F, C = joint.update(step)
+        np.testing.assert_array_equal(values, [*F, *C.ravel()])
+    assert joint.slope_retention < 0.9
+
+
+def test_a_law_that_the_page_cannot_compute_is_refused():
+    for law in (make_law(plane=0.0), make_law(bond=jl.Bond(1e12, 1e12, 5e4, 1e5))):
+        with pytest.raises(ValueError, match="laws in space that consist of asperities only"):
+            export.tables(law)
 
 
 @pytest.mark.parametrize("preset", jl.presets.names())

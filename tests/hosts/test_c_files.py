@@ -177,10 +177,10 @@ def test_a_bad_file_is_told(lib, tmp_path, law, name):
 
 
 def test_the_line_of_the_page_compiles_in_the_memory_that_it_tells(tmp_path):
-    """0.3 GB: more kinds of a step in the header would show."""
+    """0.2 GB: more kinds of a step in one function would show."""
     (tmp_path / "first.c").write_text(COPIED["native.md"])
     line = re.search(r"^    cc (.*first\.c.*)", PAGE, re.M)[1]
-    run_program("sh", "-c", f"ulimit -d 330000; gcc -I{BUILT} {line}", cwd=tmp_path)
+    run_program("sh", "-c", f"ulimit -d 230000; gcc -I{BUILT} {line}", cwd=tmp_path)
 
 
 def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):

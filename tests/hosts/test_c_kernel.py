@@ -164,8 +164,52 @@ def test_a_refused_step_tells_why(lib, tmp_path, bad, words):
         with pytest.raises(ValueError, match=words):
             joint.step(np.where(np.arange(joint.dim) == slot, bad, 1e-8))
     joint.state[0] = np.nan
-    with pytest.raises(ValueError, match="the state has numbers that are not finite"):
+    with pytest.raises(ValueError, match=r"delta\[0\] \(number 0\) of the state is nan; "):
         joint.step(np.full(joint.dim, 1e-8))
+
+
+def test_a_refused_state_is_told_with_its_number_and_bound(lib, tmp_path):
+    law = LAWS["degradation by work and stress"]
+    joint = CLaw(lib, law, tmp_path)
+    row = law.tables.first_rows["lost_slopes"]
+    joint.state[row] = 5.0
+    words = rf"lost_slopes \(number {row}\) of the state is 5.0000e\+00, above its bound 1.0000e"
+    with pytest.raises(ValueError, match=words):
+        joint.step(np.zeros(joint.dim))
+    joint.state[row] = 0.0
+    row = law.tables.first_rows["q"]
+    joint.state[row + 1] = 1e160
+    with pytest.raises(ValueError, match=r"q of the state has a sum of squares above 1\.0000e"):
+        joint.step(np.zeros(joint.dim))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_joint_is_closed_to_a_normal_stress_as_in_python(lib, tmp_path, name):
+    """To rounding in one step, although `jlaw_closure` is the limit of many steps."""
+    law = LAWS[name]
+    joint = CLaw(lib, law, tmp_path)
+    for stress in (0.0, 1e2, 3e5, 2e7):
+        F = joint.preload(stress)
+        expected = law.joint(stress)
+        assert F[0] == pytest.approx(stress, rel=1e-12, abs=1e-300)
+        np.testing.assert_allclose(F, expected.F, rtol=1e-12, atol=1e-12 * stress)
+        values = expected.snapshot().values[0]
+        np.testing.assert_allclose(
+            joint.state, values, rtol=1e-9, atol=1e-12 * np.abs(values).max()
+        )
+    joint.state[:] = 1.0  # whatever the state was
+    for invalid in (-1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="no closure"):
+            joint.preload(invalid)
+
+
+def test_one_step_to_the_closure_misses_where_slopes_decrease_by_stress(lib, tmp_path):
+    law = LAWS["degradation stress"]
+    joint = CLaw(lib, law, tmp_path)
+    F, _ = joint.step([law.closure(1e9), *np.zeros(law.dim - 1)])
+    assert 1e-3 < abs(F[0] / 1e9 - 1.0) < 0.004
+    joint.state[:] = 0.0
+    assert joint.preload(1e9)[0] == pytest.approx(1e9, rel=1e-13)
 
 
 # ----------------------------------------------------------------- turned axes

@@ -14,6 +14,7 @@ LAWS = {
     "law in a plane": replace(  # other kinds of numbers of state
         LAW, asperity=replace(LAW.asperity, yield_interference=2e-8), plane=0.0
     ),
+    "degradation by stress": replace(LAW, mating_length=2e-6, degradation_stress=1e8),
     "Coulomb's law": jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6),
 }
 SIGN = np.array([-1.0, 1.0, 1.0])  # closure and compression against opening and tension
@@ -74,6 +75,7 @@ POINTS = {
     "cohesive zone": [Behaviour],
     "cohesive zone in a plane": [Behaviour, "rock", "PlaneStrain"],
     "cohesive zone, law in a plane": [Behaviour, "rock", "PlaneStrain"],
+    "cohesive zone, degradation by stress": [Behaviour],
     "cohesive zone, Coulomb's law": [Behaviour],
     "UMAT": [Umat, 3],
     "UMAT in a plane": [Umat, 2],
@@ -105,6 +107,7 @@ def test_a_point_is_the_law_in_python(finite_elements, tmp_path, name):
         assert np.abs(host - python).max() < tolerance * np.abs(python).max()
     assert not np.any(results[100][0]), "a joint that is open must not bear stress"
     assert np.any(results[110][0]), "a joint that touched again must bear stress"
+    assert (joint.slope_retention < 0.95) == law.tables.degrades_by_stress
     state = joint.snapshot().values[0]  # by which Python can go on
     np.testing.assert_allclose(point.state[:-1], state, rtol=0, atol=1e-12 * np.abs(state).max())
 

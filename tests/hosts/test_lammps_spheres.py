@@ -26,7 +26,7 @@ create_box 1 box
 {atoms}set type 1 diameter 0.02 density 2600
 plugin load ./jointlawplugin.so
 pair_style jointlaw opening 1e-3 damping {damping}
-pair_coeff * * rock.jlaw
+pair_coeff * * {law}.jlaw
 neighbor 0.002 bin
 timestep 4e-7
 fix 1 all nve/sphere
@@ -41,7 +41,15 @@ set atom {0} omega {7!r} {8!r} {9!r}
 """
 
 
-def scene(out="out", swap=False, velocity=(0, 0, 0), damping=0.0, run=f"run {STEPS}", shift=0.0):
+def scene(
+    out="out",
+    swap=False,
+    velocity=(0, 0, 0),
+    damping=0.0,
+    run=f"run {STEPS}",
+    shift=0.0,
+    law="rock",
+):
     """Input script of the two spheres; `swap` exchanges their IDs, `shift` (m) is along x."""
     x = (X + np.array([shift, 0, 0])).tolist()
     v = (V + velocity).tolist()
@@ -49,11 +57,15 @@ def scene(out="out", swap=False, velocity=(0, 0, 0), damping=0.0, run=f"run {STE
     atoms = "".join(
         ATOM.format(tag, *x[k], *v[k], *W[k].tolist()) for tag, k in enumerate(order, 1)
     )
-    return SCENE.format(atoms=atoms, out=out, damping=damping, run=run)
+    return SCENE.format(atoms=atoms, out=out, damping=damping, run=run, law=law)
 
 
 def in_python(law):
-    """x, v, spin and force (STEPS, 2, 12) of the same by velocity Verlet with `law.joint()`."""
+    """x, v, spin and force (STEPS, 2, 12) of the same by velocity Verlet with `law.joint()`.
+
+    Then the smallest slope retention of the joint.
+    """
+    retention = 1.0
     x = X.copy()
     v = V.copy()
     w = W.copy()
@@ -91,6 +103,7 @@ def in_python(law):
             axis2 /= np.linalg.norm(axis2)
             axis3 = np.cross(axis2, n)
             f, _ = joint.update([closure - joint.delta[0], slip @ axis2, slip @ axis3])
+            retention = min(retention, joint.slope_retention)
             if closure < 0 and not f.any():
                 joint = law.joint()
                 axis2 = None
@@ -102,7 +115,7 @@ def in_python(law):
         v = v + 0.5 * DT * F / MASS
         w = w + 0.5 * DT * T / INERTIA
         rows.append(np.hstack([x, v, w, F]))
-    return np.array(rows)
+    return np.array(rows), retention
 
 
 def differ(a, b):
@@ -111,15 +124,17 @@ def differ(a, b):
     return max(np.abs(a[..., p] - b[..., p]).max() / np.abs(b[..., p]).max() for p in parts)
 
 
-def test_two_free_spinning_spheres(plugin):
+@pytest.mark.parametrize("law", ["rock", "degrading"])
+def test_two_free_spinning_spheres(plugin, law):
     """1e-12 of the largest of each, over an oblique collision: approach, slip, parting."""
-    expected = in_python(LAWS["rock"])
-    run(plugin, scene())
+    expected, retention = in_python(LAWS[law])
+    assert (retention < 0.9) == (law == "degrading")
+    run(plugin, scene(law=law))
     result = dumped(plugin / "out")[1:, :, 1:13]
     touching = np.flatnonzero(np.abs(expected[..., 9:]).max(axis=(1, 2)))
     assert 0 < touching[0] < touching[-1] < STEPS - 10  # the whole collision
     assert differ(result, expected) < 1e-12
-    run(plugin, scene(swap=True))
+    run(plugin, scene(swap=True, law=law))
     assert differ(dumped(plugin / "out")[1:, ::-1, 1:13], result) < 1e-13
 
 
@@ -132,7 +147,7 @@ RESTARTED = (
 read_restart held
 plugin load ./jointlawplugin.so
 pair_style jointlaw opening 1e-3 damping 0.1
-pair_coeff * * rock.jlaw
+pair_coeff * * {law}.jlaw
 neighbor 0.002 bin
 timestep 4e-7
 fix 1 all nve/sphere

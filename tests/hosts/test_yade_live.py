@@ -12,11 +12,14 @@ import jointlaw as jl
 SCENES = """
 from dataclasses import replace
 from jointlaw import JointLaw
-law, worn = (JointLaw.from_toml(name) for name in ("law.toml", "worn.toml"))
+law, worn, degrading = (
+    JointLaw.from_toml(f"{name}.toml") for name in ("law", "worn", "degrading"))
 bonded = replace(law, bond=worn.bond)
 end = law.closure_range
 
-def pieces(corners=((-.1, .05), (.5, 0), (.5, .5), (.5, -.25), (-.5, -.25), (.5, -.25)), steps=100):
+CORNERS = (-.1, .05), (.5, 0), (.5, .5), (.5, -.25), (-.5, -.25), (.5, -.25)
+
+def pieces(law, corners=CORNERS, steps=100):
     # eight pairs in several directions, all pieces of one flat joint; the upper spheres move
     material()
     for k in range(8):
@@ -25,7 +28,7 @@ def pieces(corners=((-.1, .05), (.5, 0), (.5, .5), (.5, -.25), (-.5, -.25), (.5,
         O.bodies.append(utils.sphere((start + .1 * k - .4, .05 * k, .8), .5))
     engines(keep=True)
     for b in O.bodies: b.state.blockedDOFs = "xyzXYZ"
-    joints = attached(LiveLaw(worn, track_dissipation=True), area=2.0, plane=(0, 0, 1))
+    joints = attached(LiveLaw(law, track_dissipation=True), area=2.0, plane=(0, 0, 1))
     O.dt = 1e-3
     O.step()
     home, here = [Vector3(b.state.pos) for b in O.bodies], np.zeros(2)
@@ -117,7 +120,7 @@ def reload(live):
                 F=last["traction"][a], F_again=again["traction"][b])
 
 out = dict(
-    pieces=pieces(),
+    pieces=[pieces(worn), pieces(degrading)],
     reload=[reload(False), reload(True)],
     visits=dict(table=visits(TableLaw("short.txt"), False, 1e-3),
                 live=visits(LiveLaw("law.toml"), True, .3 * end, max_opening=.1 * end),
@@ -165,30 +168,39 @@ def worn(law):
 
 
 @pytest.fixture(scope="module")
-def scenes(tmp_path_factory, law, worn):
+def degrading(worn):
+    """The same with slopes that decrease by the contact stress, not by work."""
+    return dataclasses.replace(worn, slope_wear=np.inf, degradation_stress=2e7)
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory, law, worn, degrading):
     """All scenes of this file, in one YADE."""
     folder = tmp_path_factory.mktemp("live")
     law.to_toml(folder / "law.toml")
     worn.to_toml(folder / "worn.toml")
+    degrading.to_toml(folder / "degrading.toml")
     jl.CoulombLaw(1e9, 5e9, friction=0.6, cohesion=1e4).to_toml(folder / "coulomb.toml")
     make_table(folder / "joint.txt", eta=0.5, uneven=0.2)
     make_table(folder / "short.txt", eta=0.5, end=law.closure_range)
     return run_scene(folder, SCENES, live=True)
 
 
-def test_pieces_of_one_plane_equal_pure_python(scenes, worn):
+@pytest.mark.parametrize("number", [0, 1], ids=["by work", "by stress"])
+def test_pieces_of_one_plane_equal_pure_python(scenes, worn, degrading, number):
     """Bond pulled and sheared till it softens; closure, shear, reversal, opening, re-contact.
 
     The law on the displacements of the plane, whatever the direction of a pair is. Rounding of
     positions: 1e-16 m of 1e-3 m.
     """
-    displaced, F, force, measures = (np.array(part) for part in scenes["pieces"].values())
+    law = (worn, degrading)[number]
+    displaced, F, force, measures = (np.array(part) for part in scenes["pieces"][number].values())
     path = displaced @ [[1, 0, 0], [0, -1, 0]]
-    joint = worn.joint()  # of id1 against id2
+    joint = law.joint()  # of id1 against id2
     exact = np.array([joint.update(d)[0] for d in np.diff(path, axis=0, prepend=np.zeros((1, 3)))])
     peak = np.abs(exact).max()
     assert np.abs(exact[:, 1]).max() > 0.1 * peak
-    assert exact[:, 0].min() < -0.8 * worn.bond.tension
+    assert exact[:, 0].min() < -0.8 * law.bond.tension
     assert (exact[:, 0] == 0.0).any()
     assert np.abs(F - exact[:, None]).max() < 1e-8 * peak
     on_upper = 2.0 * exact[:, [1, 2, 0]]  # x, y, z; area 2 m2
@@ -196,6 +208,7 @@ def test_pieces_of_one_plane_equal_pure_python(scenes, worn):
     alone = [joint.slope_retention, joint.plastic_work, joint.dissipated_energy]
     assert np.allclose(measures, np.reshape(alone, (3, 1)), rtol=1e-8, atol=0)
     assert 0.0 < joint.plastic_work < joint.dissipated_energy
+    assert joint.slope_retention < 0.9
 
 
 def test_exported_script_agrees_with_a_shear_test(tmp_path, law):

@@ -57,6 +57,22 @@ def test_shear_example_runs(tmp_path, capsys):
     assert jl.JointLaw.from_toml(out / "law.toml") == jl.presets.load("biegel-rough")
 
 
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [("jointlaw card westerly-smooth", 141), ("jointlaw --help", 0), ("dem_demo check slope", 141)],
+)
+def test_a_reader_that_ends_early_gives_no_error(line, status):
+    """As by `| head -1`: nothing on the standard error stream, the status of SIGPIPE."""
+    command = [sys.executable, "-m", *line.split()]
+    # without a buffer each line is written at once, also of a short text
+    process = subprocess.Popen(
+        [command[0], "-u", *command[1:]], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    assert process.wait() == status  # 0: of a text that argparse prints
+
+
 def test_presets_are_listed_and_start_a_file(tmp_path, capsys):
     assert main(["presets"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -10,6 +10,7 @@ from kinds import ExponentialHeights, make_law
 
 import jointlaw as jl
 from jointlaw.hosts import HOSTS
+from jointlaw.parameters.heights import KINDS
 
 ROOT = Path(__file__).parents[2]
 LAW = make_law(heights=ExponentialHeights(1e-6), c=0.0)
@@ -55,3 +56,10 @@ def test_a_table_of_such_a_law_is_saved_and_read(tmp_path):
     # between rows the table interpolates to the tolerance, relative to the stress of the law
     closure = 0.37 * table.closure[-1]
     assert read.lookup(closure).normal_stress == pytest.approx(LAW.normal_stress(closure), rel=1e-2)
+
+
+def test_a_named_class_without_declared_parameters_writes_no_law_file(monkeypatch):
+    """Its file would lack them, and be read with other values."""
+    monkeypatch.setitem(KINDS, "exponential", ExponentialHeights)
+    with pytest.raises(ValueError, match="scale of ExponentialHeights is no declared parameter"):
+        LAW.to_toml()

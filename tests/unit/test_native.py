@@ -11,8 +11,10 @@ from c_host import random_law, random_path
 
 import jointlaw as jl
 from jointlaw.kernels import engine, reference
+from jointlaw.kernels.interlock import effective_closure
 from jointlaw.kernels.threads import run_on_threads
 from jointlaw.native import build, library
+from jointlaw.support.thresholds import MIN_CHORD_STEP
 
 # Either kernel sums a few hundred terms per facet in its own order and carries q over the path: a
 # few hundred times the rounding of 1e-16. That is the share of the largest value that may differ.
@@ -120,6 +122,48 @@ def test_zeros_of_states_are_positive(both, name):
             joint.update(increment)
         if batch.kernel == "native":
             assert joint.snapshot().values.tobytes() == states[3].tobytes()
+
+
+def smallest_relative_closing(law, before, after):
+    """Smallest (y1 - y0)/y1 (n,) over the facets in contact that close by a difference quotient.
+
+    before, after: states (n, rows). Infinite where no facet closes; a smaller change than
+    MIN_CHORD_STEP takes the slope of G instead of a difference.
+    """
+    k = law.tables
+    old = reference.state_parts(k, before.T)
+    new = reference.state_parts(k, after.T)
+    y0 = effective_closure(k.asperities, old.delta, old.slope_retention)
+    y1 = effective_closure(k.asperities, new.delta, new.slope_retention)
+    closing = (y1 - y0) / np.where(y1 > 0.0, y1, np.inf)
+    return np.where(closing > MIN_CHORD_STEP, closing, np.inf).min(axis=0)
+
+
+@pytest.mark.parametrize("name", ["mating length", "degradation stress"])
+def test_tangents_differ_by_the_rounding_of_a_second_difference_only(both, name):
+    """Both kernels agree to 1e-12 where every facet closes by a hundredth of its closure or more.
+
+    In smaller steps d(chord)/dy = (kappa - chord)/dy, chord = (G1 - G0)/dy, magnifies the rounding
+    of y by up to (y/dy)^2: the difference grows so, with degradation by stress as without it.
+    """
+    law = kinds.LAWS[name]
+    slow, fast = both(lambda: law.joints(N))
+    tangents = []
+    for d in path(law, 5, 60):
+        before = slow.snapshot().values
+        (F, C), (F2, C2) = slow.update(d), fast.update(d)
+        closing = smallest_relative_closing(law, before, slow.snapshot().values)
+        off = np.abs(C - C2).max(axis=(1, 2))
+        tangents.append((np.abs(C).max(), np.abs(F).max(), np.abs(F - F2).max(), closing, off))
+    peak = max(C for C, *_ in tangents)
+    assert max(F_off for _, _, F_off, _, _ in tangents) < SAME * max(F for _, F, *_ in tangents)
+    closing = np.concatenate([one[3] for one in tangents])
+    off = np.concatenate([one[4] for one in tangents]) / peak
+    assert off[closing > 1e-2].max() < SAME
+    small = closing < 1e-2
+    assert small.sum() > 500
+    assert (off[small] * closing[small] ** 2).max() < 1e-16
+    assert off[small].max() > SAME  # so the bound by the step is needed
 
 
 def test_threads_change_no_bit(monkeypatch):

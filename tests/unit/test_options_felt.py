@@ -129,6 +129,7 @@ PROBES = {
             for name, (value, other) in FIELD.items()
         },
         "--basic-friction": (FIELD_LINE, "--basic-friction 35deg"),
+        "--degradation": (FIELD_LINE, "--degradation stress"),
     },
     **{f"export {host}": {} for host in HOSTS},
 }

@@ -82,11 +82,11 @@ def tables(law: Law) -> bytes:
     Raises ValueError for a law that joint.c does not support.
     """
     numbers, arrays = packed(law)
-    if numbers["dim"] != 3 or any(
-        numbers[name]
-        for name in ("yields", "degrades", "degrades_by_stress", "curve_exponent", *ELEMENTS)
-    ):
-        raise ValueError("joint.c supports elastic laws in space that consist of asperities only")
+    if numbers["dim"] != 3 or any(numbers[name] for name in ("curve_exponent", *ELEMENTS)):
+        raise ValueError(
+            "joint.c supports laws in space that consist of asperities only, whose heights have a "
+            "finite density at the first contact"
+        )
     head = bytes(LawStruct(**numbers))[: LawStruct.facet.offset]
     return b"".join([head, *(array.tobytes() for array in arrays.values())])
 

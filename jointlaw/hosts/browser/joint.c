@@ -34,8 +34,8 @@ EXPORT(stored) double stored(const double *s) { return jlaw_stored_energy(&law, 
 EXPORT(dissipated) double dissipated(const double *s) { return jlaw_dissipated_energy(&law, s); }
 EXPORT(closure_at) double closure_at(double stress) { return jlaw_closure(&law, stress); }
 
-/* jlaw_update from s0 to s1 for elastic asperities in space, with or without loss of interlock: F (3)
- * and C (3, 3); returns 0, or -1 and a message. Other kinds of laws would increase the file size. */
+/* jlaw_update from s0 to s1 in space: F (3) and C (3, 3); returns 0, or -1 and a message. Elements of
+ * elements.h would increase the file size. */
 EXPORT(update) int update(const double *s0, double *s1, const double *d, double *F, char *message)
 {
   const jl_states n = {s1, 1, 0};
@@ -43,8 +43,8 @@ EXPORT(update) int update(const double *s0, double *s1, const double *d, double 
   if (!jlaw_step_is_valid_(&law, s0, d, &state_is_invalid))
     return jlaw_report_invalid_(&law, s0, d, state_is_invalid, message, JLAW_MESSAGE);
   memcpy(s1, s0, (size_t) jl_state_rows(&law) * sizeof *s1);
-  if (law.interlock_decays) jl_step_space_decaying_C(&law, n, d, F, F + 3, 1, 0, NULL);
-  else jl_step_space_C(&law, n, d, F, F + 3, 1, 0, NULL);
+  if (law.interlock_decays) jl_step_general_decaying_C(&law, n, d, F, F + 3, 1, 0, NULL);
+  else jl_step_general_C(&law, n, d, F, F + 3, 1, 0, NULL);
   return 0;
 }
 

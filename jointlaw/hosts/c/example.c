@@ -42,10 +42,9 @@ int main(int argc, char **argv)
   const int dim = jlaw_dim(law), steps = 20;
   double *state = (double *) calloc((size_t) jlaw_state_size(law), sizeof *state);
   double *next = (double *) calloc((size_t) jlaw_state_size(law), sizeof *next);
-  double F[3], d[3] = {jlaw_closure(law, stress), 0.0, 0.0}, fractions[3];
+  double F[3], fractions[3];
   strcpy(message, state && next ? "the law does not reach this normal stress: use a smaller one" : "no memory is left");
-  int failed = !state || !next || !(d[0] >= 0.0)
-              || jlaw_update(law, state, state, d, F, NULL, message, sizeof message);
+  int failed = !state || !next || jlaw_preload(law, state, stress, F);
   if (failed) fail(message);
   if (!failed) printf("shear_um,closure_um,normal_MPa,shear_MPa,sliding,dissipated_J_m2\n");
   for (int i = 1; !failed && i <= (dim > 1 ? 2 * steps : 1); i++) {

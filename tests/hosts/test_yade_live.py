@@ -208,7 +208,7 @@ def test_pieces_of_one_plane_equal_pure_python(scenes, worn, degrading, number):
     alone = [joint.slope_retention, joint.plastic_work, joint.dissipated_energy]
     assert np.allclose(measures, np.reshape(alone, (3, 1)), rtol=1e-8, atol=0)
     assert 0.0 < joint.plastic_work < joint.dissipated_energy
-    assert joint.slope_retention < 0.9
+    assert joint.slope_retention < 0.96
 
 
 def test_exported_script_agrees_with_a_shear_test(tmp_path, law):

@@ -15,8 +15,9 @@
  *   - a force that is a float stays as it is: a zero increment is neutral. To this end a slider slips
  *     only beyond the friction limit and the largest rounding, JLAW_FLOAT_LIMIT_TOLERANCE.
  *
- * The error of q is the sum of independent roundings: after n steps about sqrt(n) 2^-25 |q|, and at
- * most about the square root of 2^-24 times the path of q, however many steps it takes.
+ * The error of q is the sum of independent roundings. A step that adds a part p of the interval h
+ * between two floats has the variance p (1 - p) h^2: after n steps the error is at most sqrt(n) h/2,
+ * and, however many steps it takes, at most the square root of h times the path of q.
  * kernels/float_sliders.py has the same functions in numpy. */
 #ifdef JLAW_FLOAT_SLIDERS
 #define JL_NUMBERS_PER_SLIDER 1
@@ -97,7 +98,7 @@ typedef jl_bits jl_joint_bits;
 #define JL_MIX_1 0x9E3779B97F4A7C15ULL /* odd, with well distributed bits */
 #define JL_MIX_2 0xBF58476D1CE4E5B9ULL
 #define JL_MIX_3 0x94D049BB133111EBULL
-enum { JL_DROPPED_BITS = 29 /* of the 52 bits of a double that a float does not have */ };
+#define JL_DROPPED_BITS 29 /* of the 52 bits of a double that a float does not have */
 #define JL_DROPPED_MASK ((1ULL << JL_DROPPED_BITS) - 1)
 
 /* Hash of the displacement `to` (dim) after a step */

@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 from scene_text import PLAIN, ROCK, block, coulomb, lines
 
-from dem_demo import SceneError, Simulation, parse
+from dem_demo import SceneError, Simulation
 from dem_demo.dynamics import simulation
 from dem_demo.output.run import run
 from dem_demo.scene import Scene
+from dem_demo.space import SpaceScene, SpaceSimulation, parse
 
 ROUNDING = 1e-9  # relative
 OVERWRITTEN = {
@@ -28,12 +29,14 @@ OVERWRITTEN = {
     "blocks.drives.aim",
     "manager.contacts.previous_length",
     "energy_balance.previous_forces",
+    *(f"blocks.surfaces.{name}" for name in ("box", "normal", "position", "vertex")),
 }  # in each step before they are read
 AS_AT_STEP_0 = {
     "energy_balance.start",
     "fingerprint-0",
     "fingerprint-1",
     "initial",
+    "initial_axes",
     "manager.needs_rebuild",
     "unstable",
     "verdict",
@@ -120,6 +123,27 @@ RISING = (
     + lines(time=0.02, table=[[-0.5, 0.4], [0.5, 0.0]])
     + "[run]\nend = 1.0\nrecord = 0.003\n"
 )
+# In space a block slides on two beds, so that its contacts are renewed and cross the seam, while a
+# stone falls on it; and blocks are excavated
+SLIDING = (
+    lines(gravity=[4.0, 1.5, -8.5], law="rich", rough=20.0)
+    + f"[laws.rich]\n{RICH}[laws.plain]\n{PLAIN}"
+    + block("bed", box=[4.0, 4.0, 1.0], at=[0.0, 0.0, -0.5], fixed=True)
+    + block("next", box=[4.0, 4.0, 1.0], at=[4.0, 0.0, -0.5], fixed=True)
+    + block("slab", box=[1.0, 1.0, 0.2], at=[1.4996, 0.0, 0.1], velocity=[0.3, 0.05, 0.0])
+    + block("stone", box=[0.5, 0.4, 0.2], at=[1.45, 0.1, 0.303], velocity=[0.4, 0.0, -0.5])
+    + "[run]\nend = 1.0\nrecord = 0.003\nskin = 4e-3\n"
+)
+DUG_IN_SPACE = (
+    lines(gravity=[0.3, 0.2, -9.81])
+    + f"[laws.plain]\n{coulomb(0.6)}"
+    + block("base", box=[4.0, 4.0, 1.0], at=[0.0, 0.0, -0.5], fixed=True)
+    + block("one", box=[1.0, 1.0, 0.5], at=[0.0, 0.0, 0.25])
+    + block("top", box=[0.8, 0.6, 0.5], at=[0.1, 0.0, 0.75])
+    + "[[excavate]]\nstart = 0.002\nrelease_time = 0.01\n"
+    + lines(box=[1.0, 1.0, 0.4], at=[0.1, 0.0, 0.75])
+    + "[run]\nend = 1.0\nrecord = 0.003\n"
+)
 SCENES = {  # text, steps before the state is saved, steps of the resumed run
     "impact": (IMPACT, 60, 60),
     "bounced": (IMPACT, 200, 30),
@@ -131,7 +155,15 @@ SCENES = {  # text, steps before the state is saved, steps of the resumed run
     "fast": (FAST, 20, 60),
     "bolted": (BOLTED, 60, 120),
     "rising": (RISING, 100, 100),
+    "sliding in space": (SLIDING, 60, 60),
+    "dug in space": (DUG_IN_SPACE, 30, 80),
 }
+
+
+def new_simulation(scene, saved=None):
+    """A simulation in the plane or in space."""
+    kind = SpaceSimulation if isinstance(scene, SpaceScene) else Simulation
+    return kind(scene, saved=saved)
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +173,7 @@ def simulations():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(simulation, "MAX_HALVINGS", 1)
         for name, (text, before, after) in SCENES.items():
-            sim = Simulation(parse(text))
+            sim = new_simulation(parse(text))
             for _ in range(before):
                 sim.step()
             result[name] = sim, after
@@ -163,7 +195,7 @@ def outcome(scene, saved, steps, folder, change=lambda sim: None):
     change: of the restored simulation, before its first step.
     """
     try:
-        sim = Simulation(scene, saved=saved)
+        sim = new_simulation(scene, saved)
         change(sim)
         run(sim, folder, sim.time + steps * sim.dt, pictures=None)
     except (ValueError, LookupError, AttributeError, TypeError, RuntimeWarning) as error:
@@ -175,17 +207,23 @@ def outcome(scene, saved, steps, folder, change=lambda sim: None):
     summary = json.loads((folder / "summary.json").read_text())
     tables = [(folder / name).read_text() for name in ("history.csv", "blocks.csv")]
     del summary["wall_time_s"], summary["stopped"]
-    joints = sim.joints.traction.tolist(), sim.joints.delta.tolist(), sim.contacts.length.tolist()
+    joints = sim.joints.traction.tolist(), sim.joints.delta.tolist(), sim.contacts.area.tolist()
     plastic = [float(one.pool.batch.plastic_work.sum()) for one in sim.joints.by_law]
     return message, summary, tables, joints, plastic
 
 
 def entries():
-    """Names of a saved state, and of the rows of the states of the joints that know everything."""
-    sim = Simulation(parse(IMPACT))
+    """Names of a saved state, and of the rows of the states of the joints that know everything.
+
+    In the plane; and in space those that the plane does not have, since one function restores both.
+    """
+    sim = new_simulation(parse(IMPACT))
     tables = sim.joints.by_law[-1].law.tables
-    yield from sim.state()
-    yield from (f"states-1: {name}" for name in tables.row_counts)
+    in_plane = sim.state()
+    yield from ((Simulation, name) for name in in_plane)
+    yield from ((Simulation, f"states-1: {name}") for name in tables.row_counts)
+    in_space = new_simulation(parse(SLIDING)).state()
+    yield from ((SpaceSimulation, name) for name in in_space if name not in in_plane)
 
 
 def left_out(name, sim):
@@ -207,7 +245,7 @@ def left_out(name, sim):
         value = value.copy()
         value[first : first + tables.row_counts[row]] = 0.0
         return saved | {key: value}, not np.array_equal(value, saved[key])
-    start = Simulation(sim.scene).state()[key]
+    start = new_simulation(sim.scene).state()[key]
     zeros = np.zeros_like(value)
     if start.shape != value.shape and value.any():
         return saved | {key: zeros}, True
@@ -223,10 +261,12 @@ def left_out(name, sim):
     return saved | {key: alternative}, False
 
 
-@pytest.mark.parametrize("name", [*entries()])
-def test_every_entry_of_a_saved_state_matters(name, simulations, expected, tmp_path):
+@pytest.mark.parametrize(("kind", "name"), [*entries()])
+def test_every_entry_of_a_saved_state_matters(kind, name, simulations, expected, tmp_path):
     """In one of the scenes where the entry is not as in a new simulation."""
-    states = {scene: left_out(name, sim) for scene, (sim, _) in simulations.items()}
+    states = {
+        scene: left_out(name, sim) for scene, (sim, _) in simulations.items() if type(sim) is kind
+    }
     states = {scene: result for scene, result in states.items() if result}
     new = {scene: result for scene, result in states.items() if result[1]}
     assert new or name in AS_AT_STEP_0, "no scene has another value than a new simulation"
@@ -240,18 +280,22 @@ def test_every_entry_of_a_saved_state_matters(name, simulations, expected, tmp_p
 def is_part(value):
     """Whether a value is an object of the demo that holds arrays, and not the scene."""
     is_own = type(value).__module__.startswith("dem_demo") and hasattr(value, "__dict__")
-    return is_own and not isinstance(value, Scene)
+    return is_own and not isinstance(value, Scene | SpaceScene)
 
 
-def numbers(holder, path="", seen=()):
-    """All arrays and numbers of a simulation and of its parts, by path."""
+def numbers(holder, path="", seen=None):
+    """All arrays and numbers of a simulation and of its parts, by path.
+
+    seen: parts that have been read, each by its first path.
+    """
     result = {}
+    seen = [] if seen is None else seen
     for name, value in vars(holder).items():
         place = f"{path}{name}"
         if isinstance(value, np.ndarray | float | int):
             result[place] = np.array(value)
         elif is_part(value) and all(value is not one for one in seen):
-            seen = (*seen, value)
+            seen.append(value)
             result |= numbers(value, f"{place}.", seen)
     return result
 
@@ -273,9 +317,9 @@ def test_a_restored_simulation_is_the_saved_one(scene, simulations, tmp_path):
     state = sim.state()
     pending = state | {"manager.needs_rebuild": np.ones(len(sim.scene.blocks), bool)}
     for saved in (state, pending):
-        before = Simulation(sim.scene, saved=saved)
+        before = new_simulation(sim.scene, saved)
         before.save(tmp_path)
-        for repeated in (before, Simulation.load(tmp_path)):
+        for repeated in (before, type(sim).load(tmp_path)):
             assert not differing(repeated.state(), saved)
             result = numbers(repeated)
             expected = numbers(sim)
@@ -296,10 +340,13 @@ def test_what_is_not_saved_is_overwritten_before_it_is_read(scene, simulations, 
     sim, steps = simulations[scene]
 
     def overwrite(restored):
-        for path in OVERWRITTEN:
+        for path in OVERWRITTEN & {*numbers(restored)}:
             attrgetter(path)(restored)[...] = np.nan
         bolts = restored.blocks.bolts
-        bolts.forces[:] = 0.0  # of blocks without bolts they are never written
-        bolts.forces[[*bolts.block_a, *bolts.block_b]] = np.nan
+        if bolts.n:
+            bolts.forces[:] = 0.0  # of blocks without bolts they are never written
+            bolts.forces[[*bolts.block_a, *bolts.block_b]] = np.nan
+        elif "blocks.bolts.forces" in numbers(restored):
+            bolts.forces[:] = 0.0
 
     assert outcome(sim.scene, sim.state(), steps, tmp_path, overwrite) == expected[scene]

@@ -294,15 +294,15 @@ def try_faults_of_outputs(options):
             detected_by[fault] = failed[0]
         print(fault.kind, f"{fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
               detected_by.get(fault, "not by the likely tests"), flush=True)  # fmt: skip
-    without_fault = {*failing_tests(copy, [], ["-m", marks], None)}
     while group := compatible([one for one in faults if one not in detected_by]):
         print(f"{len(group)} faults at once", flush=True)
         failed = failing_tests(copy, group, ["-m", marks], None)
-        failed = [test for test in failed if test not in without_fault]
+        if failed:
+            without_fault = failing_tests(copy, [], ["-m", marks, *failed], None)
+            failed = [test for test in failed if test not in without_fault]
         for fault in group:
-            by = failed and failing_tests(
-                copy, [fault], ["-x", "-m", marks, *failed], options.limit
-            )
+            alone = ["-x", "-m", marks, *failed]
+            by = failed and failing_tests(copy, [fault], alone, options.limit)
             detected_by[fault] = by[0] if by else ""
             print(f"{fault.kind} {fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
                   detected_by[fault] or "SURVIVED", flush=True)  # fmt: skip

@@ -254,7 +254,7 @@ def _space_picture_format(options: argparse.Namespace) -> str | None:
 def _describe_in_space(statics: Statics, result: Equilibrium) -> None:
     """Print size, rocks and verdict of a scene in space."""
     scene = statics.scene
-    contacts = f"{space_output.count_contacts(statics)} contacts of faces"
+    contacts = f"{space_output.count_contacts(statics)} contacts"
     points = f"{len(statics.points.area)} contact points"
     count = int(statics.is_free.sum())
     blocks = "1 free block" if count == 1 else f"{count} free blocks"
@@ -262,7 +262,7 @@ def _describe_in_space(statics: Statics, result: Equilibrium) -> None:
     _print_rocks(scene)
     if statics.untouched.any():
         untouched = format_blocks(list_blocks(scene, statics.untouched))
-        print(f"without a contact of faces, so that nothing supports them: {untouched}")
+        print(f"touch nothing, so that nothing supports them: {untouched}")
     print(f"initial state: {result.verdict.value}")
     _print_unstable(scene, result.verdict.value, result.unstable)
 

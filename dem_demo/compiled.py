@@ -40,7 +40,7 @@ FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "near_pairs": ([POINTER] * 2 + [INTEGER, POINTER], INTEGER),
     "separations": ([INTEGER, POINTER, DOUBLE, POINTER], None),
     "update_face_points": ([], INTEGER),
-    "face_contacts": ([INTEGER, *[POINTER] * 4, DOUBLE, POINTER], INTEGER),
+    "face_contacts": ([INTEGER, *[POINTER] * 6], INTEGER),
 }
 
 

@@ -1,4 +1,4 @@
-/* face_contacts.c: contacts of convex polyhedra, face on face.
+/* face_contacts.c: contacts of convex polyhedra, face on face, and along edges and at corners.
  *
  * Two faces that look at each other are in contact over their overlap: face A of block a is projected
  * on the plane of face B of block b and clipped by the edges of B. The contact points are the corners
@@ -10,6 +10,17 @@
  * sign of shear. Corners of the polygon that differ from a neighbour, or from the line between their
  * neighbours, by less than `tie` are no points: with them the number of points would change with the
  * rounding of flush faces.
+ *
+ * Two blocks without such faces touch along an edge, at a corner, or where two edges cross. They are
+ * in contact in the direction in which they overlap least, among the normals of their faces and the
+ * products of their edges (separating axes). If it is the normal of a face of one block, the other
+ * block stands on this face with an edge or a corner: its face next to the deepest vertex is clipped,
+ * and of the polygon only the strip next to its lowest corner counts, `strip` wide from a tilt of
+ * 5 degrees on, wider for smaller tilts, and the whole polygon up to 2 degrees. The upper corners of a
+ * strip are open, so the areas count twice there. If it is the product of two edges, the point where
+ * they cross is the contact. Blocks that meet along two edges or in a vertex of both have no joint there:
+ * areas fade within `fade` of the border of a face, and of the ends of edges that cross. As the directions of the law belong to the face that is stood on, the
+ * plane of a contact may be the one of a or of b (`plane_is_of_a`).
  *
  * Nothing here allocates memory or knows a law. Vectors are three doubles.
  */
@@ -249,69 +260,323 @@ static double project(const dem_solids *s, long long f, int reverse, const doubl
   return lowest;
 }
 
-/* Contact points of face f of block a with face g of block b, written from point `count` on;
- * returns how many there are, or TOO_MANY_CORNERS */
-static long long touch(const dem_solids *s, long long f, long long g, double max_gap,
-                       double max_depth, double tie, long long count, const dem_points *out)
+/* Keep the strip of a polygon next to its lowest corner. gradient (2,): slope of the height along both
+ * axes; sine: of the tilt; width (m): of the strip from 5 degrees on, the whole polygon up to 2.
+ * Returns the corners; `weight` is the factor of their areas. */
+static int keep_strip(double (*polygon)[2], int m, const double *gradient, double sine, double width,
+                      double *weight)
+{
+  const double slope = hypot(gradient[0], gradient[1]);
+  const double share = (sine - DEM_FLUSH_SINE) / (DEM_STRIP_SINE - DEM_FLUSH_SINE);
+  const double part = share > 1.0 ? 1.0 : share;
+  *weight = 1.0;
+  if (!(part > 0.0)) return m;
+  const double up[2] = {gradient[0] / slope, gradient[1] / slope};
+  double lowest = HUGE_VAL, highest = -HUGE_VAL;
+  for (int i = 0; i < m; i++) {
+    const double along = up[0] * polygon[i][0] + up[1] * polygon[i][1];
+    if (along < lowest) lowest = along;
+    if (along > highest) highest = along;
+  }
+  *weight = 1.0 + part;
+  if (!(highest - lowest > width)) return m;
+  const double reach = lowest + pow(highest - lowest, 1.0 - part) * pow(width, part);
+  const double start[2] = {up[0] * reach, up[1] * reach};
+  const double end[2] = {start[0] - up[1], start[1] + up[0]};
+  return clip(polygon, m, start, end);
+}
+
+/* Share of its area that a contact along an edge keeps near the border of the face that it lies on:
+ * the distance from the border, over `fade`, of the lowest line of the polygon, and at most 1 */
+static double share_inside(double (*polygon)[2], int m, double (*edges)[2], int m_edges,
+                           const double *gradient, double tie, double fade)
+{
+  double lowest = HUGE_VAL, farthest = 0.0, ends[2][2] = {{0.0}};
+  for (int i = 0; i < m; i++) {
+    const double height = gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
+    if (height < lowest) lowest = height;
+  }
+  int count = 0;
+  for (int i = 0; i < m; i++) {
+    const double height = gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
+    if (height > lowest + tie || count > 1) continue;
+    memcpy(ends[count++], polygon[i], sizeof ends[0]);
+  }
+  if (count == 1) memcpy(ends[1], ends[0], sizeof ends[0]);
+  for (int k = 0; k < 3; k++) { /* both ends of the lowest line and its middle */
+    double distance = HUGE_VAL;
+    const double x = 0.5 * (ends[k != 0][0] + ends[k == 2][0]);
+    const double y = 0.5 * (ends[k != 0][1] + ends[k == 2][1]);
+    for (int i = 0; i < m_edges; i++) {
+      const double *start = edges[i], *end = edges[(i + 1) % m_edges];
+      const double u = end[0] - start[0], v = end[1] - start[1];
+      const double inside = (u * (y - start[1]) - v * (x - start[0])) / hypot(u, v);
+      if (inside < distance) distance = inside;
+    }
+    if (distance > farthest) farthest = distance;
+  }
+  return farthest < fade ? farthest / fade : 1.0;
+}
+
+/* Write point `i`, if there is room for it. face_a, face_b: faces of the blocks; normal: outward of the
+ * block whose plane it is; base: a point of this plane */
+static void write_point(const dem_points *out, long long i, long long face_a, long long face_b,
+                        int plane_is_of_a, const double *point, const double *normal,
+                        const double *base, double area)
+{
+  if (i >= out->capacity) return;
+  out->face_a[i] = face_a;
+  out->face_b[i] = face_b;
+  out->plane_is_of_a[i] = (unsigned char) plane_is_of_a;
+  out->area[i] = area;
+  for (int j = 0; j < 3; j++) {
+    out->point[3 * i + j] = point[j];
+    out->normal[3 * i + j] = normal[j];
+    out->base[3 * i + j] = base[j];
+  }
+}
+
+/* Contact points of face f of one block with face g of another, in whose plane they are clipped,
+ * written from point `count` on. f_is_of_a: whether f belongs to the block with the lower number;
+ * strip (m): width at an edge. Returns how many there are, or TOO_MANY_CORNERS. */
+static long long touch(const dem_solids *s, long long f, long long g, int f_is_of_a, double max_gap,
+                       double max_depth, double tie, double strip, long long count,
+                       const dem_points *out)
 {
   const double *normal = s->normal + 3 * g, *face_normal = s->normal + 3 * f;
   const long long *ring = s->corner + s->first_corner[g];
   const double *origin = s->vertex + 3 * ring[0];
-  const int m_a = (int) (s->first_corner[f + 1] - s->first_corner[f]);
-  const int m_b = (int) (s->first_corner[g + 1] - s->first_corner[g]);
+  const int m_f = (int) (s->first_corner[f + 1] - s->first_corner[f]);
+  const int m_g = (int) (s->first_corner[g + 1] - s->first_corner[g]);
   double first[3], second[3], polygon[MAX_CORNERS][2], edges[MAX_CORNERS][2];
-  if (m_a + m_b > MAX_CORNERS) return TOO_MANY_CORNERS;
+  if (m_f + m_g > MAX_CORNERS - 1) return TOO_MANY_CORNERS;
   subtract(s->vertex + 3 * ring[1], origin, first);
   const double length = sqrt(dot(first, first));
   for (int j = 0; j < 3; j++) first[j] /= length;
   cross(normal, first, second);
-  const double lowest = project(s, f, 1, origin, first, second, normal, polygon);
-  if (!(lowest < max_gap && lowest > -max_depth)) return 0;
+  if (!(project(s, f, 1, origin, first, second, normal, polygon) < max_gap)) return 0;
   project(s, g, 0, origin, first, second, normal, edges);
-  int m = m_a;
-  for (int i = 0; i < m_b && m > 2; i++) m = clip(polygon, m, edges[i], edges[(i + 1) % m_b]);
+  int m = m_f;
+  for (int i = 0; i < m_g && m > 2; i++) m = clip(polygon, m, edges[i], edges[(i + 1) % m_g]);
   m = without_ties(polygon, m, tie);
   if (m < 3) return 0;
-  double centroid[2], start[3];
-  if (!(polygon_area(polygon, m, centroid) > tie * tie)) return 0;
+  double start[3], product[3], weight;
   subtract(s->vertex + 3 * s->corner[s->first_corner[f]], origin, start);
-  const double cosine = dot(face_normal, normal);
+  cross(face_normal, normal, product);
+  const double cosine = dot(face_normal, normal), sine = sqrt(dot(product, product));
+  const double gradient[2] = {-dot(face_normal, first) / cosine, -dot(face_normal, second) / cosine};
+  const double height = dot(face_normal, start) / cosine; /* of the plane of f at the origin */
+  double lowest = HUGE_VAL;
   for (int i = 0; i < m; i++) {
-    if (count + i >= out->capacity) continue;
+    const double here = height + gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
+    if (here < lowest) lowest = here;
+  }
+  if (!(lowest < max_gap && lowest > -max_depth)) return 0;
+  const double share =
+      sine > DEM_FLUSH_SINE
+          ? share_inside(polygon, m, edges, m_g, gradient, tie, DEM_FADE_PER_GAP * max_gap)
+          : 1.0;
+  m = keep_strip(polygon, m, gradient, sine, strip, &weight);
+  m = without_ties(polygon, m, tie);
+  double centroid[2];
+  if (m < 3 || !(share * polygon_area(polygon, m, centroid) > tie * tie)) return 0;
+  for (int i = 0; i < m; i++) {
     const double *here = polygon[i];
-    double at[3];
-    for (int j = 0; j < 3; j++) at[j] = here[0] * first[j] + here[1] * second[j];
-    const double height = (dot(face_normal, start) - dot(face_normal, at)) / cosine;
-    double *point = out->point + 3 * (count + i);
-    for (int j = 0; j < 3; j++) point[j] = origin[j] + at[j] + height * normal[j];
-    out->area[count + i] = 0.5 * (triangle_area(polygon[(i + m - 1) % m], here, centroid) +
-                                  triangle_area(here, polygon[(i + 1) % m], centroid));
-    out->face_a[count + i] = f;
-    out->face_b[count + i] = g;
+    const double up = height + gradient[0] * here[0] + gradient[1] * here[1];
+    const double area = 0.5 * (triangle_area(polygon[(i + m - 1) % m], here, centroid) +
+                               triangle_area(here, polygon[(i + 1) % m], centroid));
+    double point[3];
+    for (int j = 0; j < 3; j++)
+      point[j] = origin[j] + here[0] * first[j] + here[1] * second[j] + up * normal[j];
+    write_point(out, count + i, f_is_of_a ? f : g, f_is_of_a ? g : f, !f_is_of_a, point, normal,
+                origin, share * weight * area);
   }
   return m;
 }
 
+/* Face of block i with vertex v, or with vertices v and w, that looks most along a direction */
+static long long face_at(const dem_solids *s, long long i, long long v, long long w,
+                         const double *direction)
+{
+  long long best = s->first_face[i];
+  double largest = -HUGE_VAL;
+  for (long long f = s->first_face[i]; f < s->first_face[i + 1]; f++) {
+    int members = 0;
+    for (long long c = s->first_corner[f]; c < s->first_corner[f + 1]; c++)
+      members += (s->corner[c] == v) + (s->corner[c] == w && w != v);
+    if (members < 1 + (w != v)) continue;
+    const double cosine = dot(s->normal + 3 * f, direction);
+    if (cosine > largest) {
+      largest = cosine;
+      best = f;
+    }
+  }
+  return best;
+}
+
+/* Vertex of block i that lies deepest below a plane; `height` is its height over it */
+static long long deepest_vertex(const dem_solids *s, long long i, const double *origin,
+                                const double *normal, double *height)
+{
+  long long deepest = s->first_vertex[i];
+  *height = HUGE_VAL;
+  for (long long v = s->first_vertex[i]; v < s->first_vertex[i + 1]; v++) {
+    double at[3];
+    subtract(s->vertex + 3 * v, origin, at);
+    const double here = dot(at, normal);
+    if (here < *height) {
+      *height = here;
+      deepest = v;
+    }
+  }
+  return deepest;
+}
+
+/* Where two blocks are farthest apart along the product of two edges that cross */
+typedef struct {
+  double separation, normal[3], on_a[3], on_b[3]; /* normal from b to a */
+  long long a[2], b[2];                           /* vertices of the edges */
+  double inside;                                  /* least distance from their ends */
+} crossing;
+
+/* Compare the crossing of edges `a` and `b` with the best one so far */
+static void try_crossing(const dem_solids *s, long long block_a, long long block_b,
+                         const long long *a, const long long *b, crossing *best)
+{
+  double one[3], other[3], normal[3], between[3];
+  const double *start_a = s->vertex + 3 * a[0], *start_b = s->vertex + 3 * b[0];
+  subtract(s->vertex + 3 * a[1], start_a, one);
+  subtract(s->vertex + 3 * b[1], start_b, other);
+  cross(one, other, normal);
+  const double square = dot(normal, normal), size = sqrt(square);
+  if (size < DEM_CROSSING_SINE * sqrt(dot(one, one) * dot(other, other))) return;
+  subtract(start_b, start_a, between);
+  double part[3];
+  cross(between, other, part);
+  const double along_a = dot(part, normal) / square;
+  cross(between, one, part);
+  const double along_b = dot(part, normal) / square;
+  if (!(along_a >= 0.0 && along_a <= 1.0 && along_b >= 0.0 && along_b <= 1.0)) return;
+  for (int j = 0; j < 3; j++) normal[j] /= size;
+  double low_a, high_a, low_b, high_b;
+  extent(s, block_a, normal, &low_a, &high_a);
+  extent(s, block_b, normal, &low_b, &high_b);
+  const double separation = low_a - high_b > low_b - high_a ? low_a - high_b : low_b - high_a;
+  if (!(separation > best->separation)) return;
+  const double sign = low_a - high_b > low_b - high_a ? 1.0 : -1.0;
+  double on_a[3], on_b[3], gap = 0.0;
+  for (int j = 0; j < 3; j++) {
+    on_a[j] = start_a[j] + along_a * one[j];
+    on_b[j] = start_b[j] + along_b * other[j];
+    gap += sign * normal[j] * (on_a[j] - on_b[j]);
+  }
+  if (fabs(gap - separation) > DEM_CROSSING_ERROR * sqrt(dot(one, one)))
+    return; /* other vertices are nearer along this direction */
+  best->separation = separation;
+  best->inside = fmin(fmin(along_a, 1.0 - along_a) * sqrt(dot(one, one)),
+                      fmin(along_b, 1.0 - along_b) * sqrt(dot(other, other)));
+  for (int j = 0; j < 3; j++) {
+    best->normal[j] = sign * normal[j];
+    best->on_a[j] = on_a[j];
+    best->on_b[j] = on_b[j];
+  }
+  memcpy(best->a, a, sizeof best->a);
+  memcpy(best->b, b, sizeof best->b);
+}
+
+/* The crossing of edges of two blocks along which they are farthest apart, if that is farther than
+ * `least` */
+static crossing find_crossing(const dem_solids *s, long long block_a, long long block_b,
+                              double least)
+{
+  crossing best = {.separation = least, .a = {-1, -1}};
+  for (long long f = s->first_face[block_a]; f < s->first_face[block_a + 1]; f++) {
+    const long long *ring = s->corner + s->first_corner[f];
+    const long long m = s->first_corner[f + 1] - s->first_corner[f];
+    for (long long i = 0; i < m; i++) {
+      const long long a[2] = {ring[i], ring[(i + 1) % m]};
+      if (a[0] > a[1]) continue; /* each edge belongs to two faces */
+      for (long long g = s->first_face[block_b]; g < s->first_face[block_b + 1]; g++) {
+        const long long *other = s->corner + s->first_corner[g];
+        const long long q = s->first_corner[g + 1] - s->first_corner[g];
+        for (long long k = 0; k < q; k++) {
+          const long long b[2] = {other[k], other[(k + 1) % q]};
+          if (b[0] < b[1]) try_crossing(s, block_a, block_b, a, b, &best);
+        }
+      }
+    }
+  }
+  return best;
+}
+
+/* Contact points of two blocks that touch along an edge, at a corner, or where two edges cross,
+ * written from point `count` on; returns how many there are, or TOO_MANY_CORNERS */
+static long long touch_at_edges(const dem_solids *s, long long a, long long b, double max_gap,
+                                double max_depth, double tie, double strip, long long count,
+                                const dem_points *out)
+{
+  const long long block[2] = {a, b};
+  double largest = -HUGE_VAL;
+  long long plane = -1, vertex = -1;
+  int side = 0; /* block of the plane */
+  for (int i = 0; i < 2; i++)
+    for (long long f = s->first_face[block[i]]; f < s->first_face[block[i] + 1]; f++) {
+      double height;
+      const long long deepest =
+          deepest_vertex(s, block[1 - i], s->vertex + 3 * s->corner[s->first_corner[f]],
+                         s->normal + 3 * f, &height);
+      if (height > largest) {
+        largest = height;
+        plane = f;
+        vertex = deepest;
+        side = i;
+      }
+      if (largest >= max_gap) return 0;
+    }
+  const crossing best = find_crossing(s, a, b, largest);
+  if (best.separation >= max_gap || best.separation <= -max_depth) return 0;
+  if (best.a[0] >= 0) {
+    const double share = fmin(best.inside / (DEM_FADE_PER_GAP * max_gap), 1.0);
+    if (!(share * strip * strip > tie * tie)) return 0;
+    const double down[3] = {-best.normal[0], -best.normal[1], -best.normal[2]};
+    write_point(out, count, face_at(s, a, best.a[0], best.a[1], down),
+                face_at(s, b, best.b[0], best.b[1], best.normal), 0, best.on_a, best.normal,
+                best.on_b, share * strip * strip);
+    return 1;
+  }
+  const double *normal = s->normal + 3 * plane;
+  const double down[3] = {-normal[0], -normal[1], -normal[2]};
+  const long long face = face_at(s, block[1 - side], vertex, vertex, down);
+  return touch(s, face, plane, side, max_gap, max_depth, tie, strip, count, out);
+}
+
 /* Contact points of pairs (p, 2) of blocks, the lower number first.
  *
- * max_gap, max_depth, tie (p,) in m: range of the lowest corner of a face over the other plane, and
- * the distance that counts as zero. max_cosine: largest cosine of two normals, -1 for parallel faces
- * that look at each other. Writes at most `capacity` points, all points of a contact in a row, counter-
- * clockwise seen along the normal of b; returns how many there are, or TOO_MANY_CORNERS. */
+ * max_gap, max_depth, tie, strip (p,) in m: range of the lowest point of a contact over the other
+ * plane, the distance that counts as zero, and the width of a contact along an edge. Writes at most
+ * `capacity` points, all points of a contact in a row, counter-clockwise seen along the normal of its
+ * plane; returns how many there are. */
 EXPORT long long dem_face_contacts(const dem_solids *s, long long p, const long long *pairs,
                                    const double *max_gap, const double *max_depth,
-                                   const double *tie, double max_cosine, const dem_points *out)
+                                   const double *tie, const double *strip, const dem_points *out)
 {
+  const double max_cosine = -sqrt(1.0 - DEM_FLUSH_SINE * DEM_FLUSH_SINE);
   long long count = 0;
   for (long long i = 0; i < p; i++) {
-    const long long a = pairs[2 * i], b = pairs[2 * i + 1];
+    const long long a = pairs[2 * i], b = pairs[2 * i + 1], before = count;
     for (long long f = s->first_face[a]; f < s->first_face[a + 1]; f++)
       for (long long g = s->first_face[b]; g < s->first_face[b + 1]; g++) {
         if (dot(s->normal + 3 * f, s->normal + 3 * g) > max_cosine) continue;
-        const long long found = touch(s, f, g, max_gap[i], max_depth[i], tie[i], count, out);
+        const long long found =
+            touch(s, f, g, 1, max_gap[i], max_depth[i], tie[i], strip[i], count, out);
         if (found == TOO_MANY_CORNERS) return found;
         count += found;
       }
+    if (count > before) continue;
+    const long long found =
+        touch_at_edges(s, a, b, max_gap[i], max_depth[i], tie[i], strip[i], count, out);
+    if (found == TOO_MANY_CORNERS) return found;
+    count += found;
   }
   return count;
 }

@@ -1,8 +1,9 @@
 /* face_points.c: rows of contact points of faces on faces, while the blocks move.
  *
- * A point is fixed to block a, on whose face it lies. The directions of the law are fixed to block b:
- * the normal of its face, axis 2 and axis 3. The closure is the depth of the point below the plane of
- * the face of b, so with the shears at the point it has exact rates by the motions of both blocks, and
+ * A point is fixed to one block, and the plane that it lies on to the other one, with the directions
+ * of the law: the normal out of the block of the plane, and two axes along which the block of the
+ * point moves where shears grow. The plane is of block b, or of a where a block stands on its edge
+ * (face_contacts.c). The closure is the depth of the point below the plane, so with the shears at the point it has exact rates by the motions of both blocks, and
  * the work of the tractions on the blocks is the work that the joint takes up. The polygons of the
  * overlaps, and with them points and areas, change where contacts are searched again.
  */
@@ -34,20 +35,22 @@ static void to_block(const double *axes, const double *vector, double *out)
     out[j] = axes[j] * vector[0] + axes[3 + j] * vector[1] + axes[6 + j] * vector[2];
 }
 
-/* Row of one displacement of the law, whose rate is `direction` times the velocity of a at the point
- * less the velocity of b there. arm_a, arm_b: from the centroids, along the axes of the blocks */
-static void fill_row(const double *direction, const double *axes_a, const double *arm_a,
-                     const double *axes_b, const double *arm_b, double *row)
+/* Row of one displacement of the law, whose rate is `direction` times the velocity at the point of its
+ * block less the velocity of the other block there. arm, other_arm: from the centroids, along the axes
+ * of the blocks; row, other_row: the parts of both blocks */
+static void fill_row(const double *direction, const double *axes, const double *arm,
+                     const double *other_axes, const double *other_arm, double *row,
+                     double *other_row)
 {
-  double in_a[3], in_b[3], turn_b[3];
-  to_block(axes_a, direction, in_a);
-  to_block(axes_b, direction, in_b);
-  cross(arm_a, in_a, row + 3);
-  cross(arm_b, in_b, turn_b);
+  double along[3], turn[3];
+  to_block(axes, direction, along);
+  cross(arm, along, row + 3);
+  to_block(other_axes, direction, along);
+  cross(other_arm, along, turn);
   for (int j = 0; j < 3; j++) {
     row[j] = direction[j];
-    row[6 + j] = -direction[j];
-    row[9 + j] = -turn_b[j];
+    other_row[j] = -direction[j];
+    other_row[3 + j] = -turn[j];
   }
 }
 
@@ -56,21 +59,25 @@ EXPORT long long dem_update_face_points(dem_face_points *points)
 {
   const long long n = points->n_blocks;
   for (long long i = 0; i < points->n_points; i++) {
+    const int of_a = points->plane_is_of_a[i]; /* the plane */
     const long long a = points->block_a[i], b = points->block_b[i];
-    const double *axes_a = points->axes + 9 * a, *axes_b = points->axes + 9 * b;
+    const long long own = of_a ? b : a, other = of_a ? a : b;
+    const double *axes = points->axes + 9 * own, *other_axes = points->axes + 9 * other;
     const double *local_point = points->local_point + 3 * i;
     const double *local_frame = points->local_frame + 9 * i;
-    double *rows = points->kinematics + 36 * i;
-    double arm[3], arm_b[3], frame[3][3];
-    to_space(axes_a, local_point, arm);
-    for (int j = 0; j < 3; j++)
-      arm[j] += points->motion[j * n + a] - points->motion[j * n + b]; /* from the centroid of b */
-    to_block(axes_b, arm, arm_b);
-    for (int c = 0; c < 3; c++) to_space(axes_b, local_frame + 3 * c, frame[c]);
-    points->closure[i] = points->plane_offset[i] - dot(arm_b, local_frame);
-    for (int j = 0; j < 3; j++) frame[0][j] = -frame[0][j]; /* towards b is closing */
+    double *row = points->kinematics + 36 * i + 6 * of_a;
+    double *other_row = points->kinematics + 36 * i + 6 * !of_a;
+    double arm[3], other_arm[3], frame[3][3];
+    to_space(axes, local_point, arm);
+    for (int j = 0; j < 3; j++) /* from the other centroid */
+      arm[j] += points->motion[j * n + own] - points->motion[j * n + other];
+    to_block(other_axes, arm, other_arm);
+    for (int c = 0; c < 3; c++) to_space(other_axes, local_frame + 3 * c, frame[c]);
+    points->closure[i] = points->plane_offset[i] - dot(other_arm, local_frame);
+    for (int j = 0; j < 3; j++) frame[0][j] = -frame[0][j]; /* towards the plane is closing */
     for (int c = 0; c < 3; c++)
-      fill_row(frame[c], axes_a, local_point, axes_b, arm_b, rows + 12 * c);
+      fill_row(frame[c], axes, local_point, other_axes, other_arm, row + 12 * c,
+               other_row + 12 * c);
   }
   return 0;
 }

@@ -32,6 +32,11 @@ class Constant(NamedTuple):
 
 CONSTANTS = {
     "PARALLEL_SINE": Constant(1e-9, "sine of an angle that differs from 0 by rounding only"),
+    "FLUSH_SINE": Constant(0.03489949670250097, "sine of 2 degrees: faces that lie on each other"),
+    "STRIP_SINE": Constant(0.08715574274765817, "sine of 5 degrees: a block stands on its edge"),
+    "FADE_PER_GAP": Constant(0.125, "of the range of contacts: where an edge contact fades"),
+    "CROSSING_SINE": Constant(1e-3, "sine between two edges that cross"),
+    "CROSSING_ERROR": Constant(1e-9, "of the length of an edge: rounding of a distance of blocks"),
     "RANGE_TOLERANCE": Constant(1e-10, "m by which a corner may leave its range: no chatter"),
 }
 
@@ -222,7 +227,10 @@ POINTS = {
     "capacity": Field("long long", "points that the arrays have room for"),
     "face_a": Field("long long *", "(capacity,): face of the block with the lower number"),
     "face_b": Field("long long *", "(capacity,): face of the other block"),
-    "point": Field("double *", "(capacity, 3): on face a, m"),
+    "plane_is_of_a": Field("unsigned char *", "(capacity,): 0 where the plane belongs to b"),
+    "point": Field("double *", "(capacity, 3): on the other block than the plane, m"),
+    "normal": Field("double *", "(capacity, 3): of the plane, out of its block"),
+    "base": Field("double *", "(capacity, 3): a point of the plane, m"),
     "area": Field("double *", "(capacity,): m2"),
 }
 FACE_POINTS = {
@@ -230,12 +238,13 @@ FACE_POINTS = {
     "n_points": Field("long long", "k"),
     "motion": Field("const double *", "(12, n): as in dem_step; the places are read"),
     "axes": Field("const double *", "(n, 3, 3): principal axes of the blocks, as columns"),
-    "block_a": Field("const long long *", "(k,): block on whose face the point lies"),
+    "block_a": Field("const long long *", "(k,): the block with the lower number"),
     "block_b": Field("const long long *", "(k,): the other block"),
-    "local_point": Field("const double *", "(k, 3): from the centroid of a, along its axes, m"),
-    "local_frame": Field("const double *", "(k, 3, 3): normal, axes 2 and 3, along the axes of b"),
-    "plane_offset": Field("const double *", "(k,): m, of the face of b from its centroid"),
-    "closure": Field("double *", "(k,): m, depth of the point below the plane of b"),
+    "plane_is_of_a": Field("const unsigned char *", "(k,): 0 where the plane belongs to b"),
+    "local_point": Field("const double *", "(k, 3): m, from its block, along the axes of it"),
+    "local_frame": Field("const double *", "(k, 3, 3): normal, axes of shear, in the other block"),
+    "plane_offset": Field("const double *", "(k,): m, of the plane from the centroid of its block"),
+    "closure": Field("double *", "(k,): m, depth of the point below the plane"),
     "kinematics": Field("double *", "(k, 3, 12): of closure and shears by motions of a, b"),
 }
 BOLTS = {

@@ -7,7 +7,7 @@ scene      a scene in memory
 keys       the keys of all tables of a scene, with a rule for each value
 read       a scene, in the plane or in space, from its file
 loads      water on faces and in joints, stress from outside, and other loads
-contacts   contact points of faces that lie on each other, and their kinematics
+contacts   contact points of faces, edges and corners, and their kinematics
 face_laws  law and rough direction of each contact
 statics    static equilibrium, and blocks that have none
 drawing    what a picture shows: faces, edges, states, rough directions

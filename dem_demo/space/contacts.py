@@ -11,8 +11,13 @@ below the plane of the face of block b. The directions of the law are fixed to b
 of its face, axis 2 (the rough direction of the joint) and axis 3, so the history of a joint rotates
 with the rock. The roles never change; they follow from the numbers of the blocks alone.
 
+Blocks whose faces are tilted by more than 2 degrees against each other stand on an edge or a
+corner, or two of their edges cross. Then the point belongs to the block that stands on the other
+one, and the plane and the directions of the law to the other one, whichever of them is a. The joint
+along an edge is a strip whose width is given.
+
 The geometry is computed by `native/face_contacts.c`, which knows no Python and no law, so another
-code can carry it. Faces that are tilted by more than 2 degrees against each other are no contact.
+code can carry it.
 """
 
 from collections.abc import Sequence
@@ -23,11 +28,14 @@ import numpy as np
 
 from ..compiled import PointArrays, SolidArrays, address
 from ..contact import ContactRows
+from ..native.layout import CONSTANTS
 from .solids import Solid
 
-MAX_TILT = np.radians(2.0)  # of two faces in contact
+MAX_TILT = np.arcsin(CONSTANTS["FLUSH_SINE"].value)  # of two faces that lie on each other, rad
 TIE_PER_WIDTH = 1e-5  # of the narrower block: distances below it count as zero
 POINTS_PER_PAIR = 8  # room for points at first
+MIN_AXIS_SINE = 0.1  # between a rough direction and the normal of the plane that it lies in
+MAX_STRIP_PER_WIDTH = 0.5  # of the narrower block: widest joint along an edge
 MAX_FACE_CORNERS = 128  # of two faces, as in face_contacts.c
 
 
@@ -129,17 +137,32 @@ def _starts(counts) -> np.ndarray:
 class ContactPoints(NamedTuple):
     """k contact points; all points of a contact of two faces follow each other.
 
-    block_a, block_b, face_a, face_b (k,): numbers of blocks and faces, block_a < block_b. point
-    (k, 3): on face a, m. area (k,) in m2. contact (k,): number of the contact of two faces.
+    block_a, block_b, face_a, face_b (k,): numbers of blocks and faces, block_a < block_b.
+    plane_is_of_a (k,): whether the plane of the contact belongs to block a; else to b. point
+    (k, 3) in m: on the other block. normal (k, 3): of the plane, out of its block; base (k, 3): a
+    point of it, in m. area (k,) in m2. contact (k,): number of the contact of two faces.
     """
 
     block_a: np.ndarray
     block_b: np.ndarray
     face_a: np.ndarray
     face_b: np.ndarray
+    plane_is_of_a: np.ndarray
     point: np.ndarray
+    normal: np.ndarray
+    base: np.ndarray
     area: np.ndarray
     contact: np.ndarray
+
+    @property
+    def closure(self) -> np.ndarray:
+        """Depth (k,) in m below the plane; below zero a gap."""
+        return np.einsum("ki,ki->k", self.base - self.point, self.normal)
+
+    @property
+    def normal_to_a(self) -> np.ndarray:
+        """Normals (k, 3) from block b to block a."""
+        return np.where(self.plane_is_of_a[:, None], -self.normal, self.normal)
 
 
 def require_apart(
@@ -163,13 +186,18 @@ def require_apart(
 
 
 def find_contacts(
-    surfaces: Surfaces, reach: np.ndarray, max_overlap: float, pairs: np.ndarray | None = None
+    surfaces: Surfaces,
+    reach: np.ndarray,
+    max_overlap: float,
+    pairs: np.ndarray | None = None,
+    corner_length: float = np.inf,
 ) -> ContactPoints:
-    """Find all contacts of faces at the present places of the blocks.
+    """Find all contacts at the present places of the blocks.
 
     reach (n,) in m: two faces are in contact where their gap is below the sum of the reaches.
     max_overlap: largest depth of a contact, as a fraction of the width of the narrower block.
     pairs (p, 2): of blocks to be searched, the lower number first; by default all near ones.
+    corner_length (m): width of the joint along an edge, at most half of the narrower block.
 
     Raises ValueError for faces of too many corners.
     """
@@ -180,17 +208,20 @@ def find_contacts(
     max_gap = reach[pairs].sum(axis=1)
     max_depth = max_overlap * width
     tie = TIE_PER_WIDTH * width
+    strip = np.minimum(corner_length, MAX_STRIP_PER_WIDTH * width)
     room = POINTS_PER_PAIR * len(pairs)
     while True:
         face_a, face_b = np.empty((2, room), np.int64)
-        point = np.empty((room, 3))
+        plane_is_of_a = np.empty(room, bool)
+        point, normal, base = np.empty((3, room, 3))
         area = np.empty(room)
         out = PointArrays(capacity=room)
-        out.bind(face_a=face_a, face_b=face_b, point=point, area=area)
-        places = map(address, (pairs, max_gap, max_depth, tie))
-        count = surfaces.arrays.call(
-            "face_contacts", len(pairs), *places, -np.cos(MAX_TILT), address(out)
-        )
+        out.bind(
+            face_a=face_a, face_b=face_b, plane_is_of_a=plane_is_of_a, point=point, normal=normal,
+            base=base, area=area,
+        )  # fmt: skip
+        places = map(address, (pairs, max_gap, max_depth, tie, strip))
+        count = surfaces.arrays.call("face_contacts", len(pairs), *places, address(out))
         if count < 0:
             raise ValueError(f"two faces in contact have more than {MAX_FACE_CORNERS} corners")
         if count <= room:
@@ -200,7 +231,8 @@ def find_contacts(
     starts = np.append(True, np.diff(face_a).astype(bool) | np.diff(face_b).astype(bool))[:count]
     return ContactPoints(
         surfaces.block_of_face[face_a], surfaces.block_of_face[face_b], face_a, face_b,
-        point[:count].copy(), area[:count].copy(), np.cumsum(starts) - 1,
+        plane_is_of_a[:count].copy(), point[:count].copy(), normal[:count].copy(),
+        base[:count].copy(), area[:count].copy(), np.cumsum(starts) - 1,
     )  # fmt: skip
 
 
@@ -232,13 +264,18 @@ def turned_from_dip(normal: np.ndarray, degrees: np.ndarray) -> np.ndarray:
 
 
 def contact_axes(surfaces: Surfaces, points: ContactPoints, axis_2: np.ndarray) -> np.ndarray:
-    """Axes (k, 3, 3) of the law at contact points: normal of block b, axis 2, axis 3.
+    """Axes (k, 3, 3) of the law at contact points: normal from b to a, axis 2, axis 3.
 
-    axis_2 (k, 3): directions that are projected on the faces of b.
+    axis_2 (k, 3): directions that are projected on the planes of the contacts; the dip line where
+    a direction is almost normal to its plane, as where a block stands on its edge.
     """
-    normal = surfaces.normal[points.face_b]
+    normal = points.normal_to_a
     axis_2 = axis_2 - np.einsum("ki,ki->k", axis_2, normal)[:, None] * normal
-    axis_2 /= np.linalg.norm(axis_2, axis=1)[:, None]
+    size = np.linalg.norm(axis_2, axis=1)
+    is_across = size < MIN_AXIS_SINE
+    axis_2[is_across] = dip_line(normal[is_across])
+    size[is_across] = 1.0
+    axis_2 /= size[:, None]
     return np.stack([normal, axis_2, np.cross(normal, axis_2)], axis=1)
 
 
@@ -249,8 +286,6 @@ def contact_rows(surfaces: Surfaces, points: ContactPoints, axes: np.ndarray) ->
     contact.
     """
     k = len(points.area)
-    normal = axes[:, 0]
-    on_face = surfaces.vertex[surfaces.corner[surfaces.first_corner[points.face_b]]]
     rates = axes * np.array([-1.0, 1.0, 1.0])[:, None]  # of closure and shears by a
     parts = []
     for block, sign in ((points.block_a, 1.0), (points.block_b, -1.0)):
@@ -260,7 +295,7 @@ def contact_rows(surfaces: Surfaces, points: ContactPoints, axes: np.ndarray) ->
     rows = ContactRows.zeros(k, dim=3, dof=6, n_keys=3)
     rows.block_a[:] = points.block_a
     rows.block_b[:] = points.block_b
-    rows.closure[:] = np.einsum("ki,ki->k", on_face - points.point, normal)
+    rows.closure[:] = points.closure
     rows.area[:] = points.area
     rows.kinematics[:] = np.concatenate(parts, axis=2)
     first = np.searchsorted(points.contact, points.contact)

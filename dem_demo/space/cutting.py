@@ -19,6 +19,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+from shapely import Polygon
 
 from jointlaw.support.progress import track
 
@@ -190,8 +191,7 @@ def _regions_of(piece: Solid, regions: Sequence[Solid]) -> tuple[bool, ...]:
 def excavation_cuts(pieces: Sequence[Solid], regions: Sequence[Solid]) -> list[tuple[int, int]]:
     """Pairs of pieces that only a cut along the faces of a region separates, not its outline.
 
-    Both lie outside all the same regions, or inside them. A pair may be listed whose faces lie in
-    one plane and do not touch.
+    Both lie outside all the same regions, or inside them.
     """
     cut = [i for i, piece in enumerate(pieces) if EXCAVATION in piece.face_sets]
     inside = {i: _regions_of(pieces[i], regions) for i in cut}
@@ -202,10 +202,28 @@ def excavation_cuts(pieces: Sequence[Solid], regions: Sequence[Solid]) -> list[t
         low = np.maximum(one.vertices.min(axis=0), other.vertices.min(axis=0))
         high = np.minimum(one.vertices.max(axis=0), other.vertices.max(axis=0))
         if inside[i] == inside[j] and (low < high + tolerance).all():
-            numbers = {one.face_sets[k] for k in _faces_on(one, other, tolerance)}
-            if EXCAVATION in numbers:
+            is_common = [
+                one.face_sets[k] == EXCAVATION and _faces_overlap(one, k, other, tolerance)
+                for k in _faces_on(one, other, tolerance)
+            ]
+            if any(is_common):
                 pairs.append((i, j))
     return pairs
+
+
+def _faces_overlap(one: Solid, face: int, other: Solid, tolerance: float) -> bool:
+    """Whether a face of one solid has an area in common with a face of another in its plane."""
+    normal = one.face_normals[face]
+    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    plane = np.stack([first, np.cross(normal, first)], axis=1)
+    ring = one.vertices[list(one.faces[face])]
+    outline = Polygon((ring - ring[0]) @ plane)
+    for number in _faces_on(other, one, tolerance):
+        if other.face_normals[number] @ normal < -0.5:
+            opposite = Polygon((other.vertices[list(other.faces[number])] - ring[0]) @ plane)
+            if outline.intersection(opposite).area > tolerance * outline.length:
+                return True
+    return False
 
 
 def _faces_on(one: Solid, other: Solid, tolerance: float) -> list[int]:

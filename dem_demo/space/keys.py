@@ -133,6 +133,7 @@ RUN = {
     "fraction": partial(within, low=1e-6, high=0.95, unit="of the limit"),
     "step": POSITIVE, "settle": FLAG, "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
     "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
+    "corner_length": POSITIVE,
 }  # fmt: skip
 SCENE = {
     "title": TEXT, "gravity": vector, "seismic": seismic_coefficients, "density": DENSITY,

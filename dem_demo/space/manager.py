@@ -1,13 +1,13 @@
 """The contact manager in space: contact points while blocks move, and their identity in time.
 
-Between two rebuilds of the list of contacts a point is fixed to block a, and the compiled step
+Between two rebuilds of the list of contacts a point is fixed to its block, and the compiled step
 follows its closure (`native/face_points.c`). A rebuild clips the faces of blocks that have moved by
 a twentieth of their skin anew, so polygons, points and areas follow.
 
 Identity. A joint remembers its history. A point of a rebuilt list continues the joint of the
 nearest point that the same two faces had before, in the frame of block a. Two new points may
 continue one old joint where a polygon gains a corner; the second gets a copy. Points lie on the
-face of a, so closures do not jump. The roles of the blocks never change.
+face of their block, so closures do not jump. The roles of the blocks never change.
 
 Seams. A block may slide from one block onto its coplanar neighbour. With new joints rough faces
 would drop there by their whole dilation, although the surface does not end at a seam. The points of
@@ -16,8 +16,9 @@ have the face of a or the face of b in common, their other faces are coplanar, a
 same way (`find_neighbours`). All other faces that meet in a run meet anew: their joints are unmated
 if their law has a mating length.
 
-Only faces support each other. Where blocks touch along an edge or at a corner, tilted by more than
-2 degrees, a rebuild raises an error rather than to miss a contact.
+Edges and corners. A block that stands on an edge or a corner has its points on the face of the
+other block, whichever of them is a (`native/face_contacts.c`). Where it rolls on, its points
+continue their joints. An overlap that no contact sees raises an error in a rebuild.
 """
 
 import numpy as np
@@ -35,17 +36,24 @@ MOVED_FRACTION = 0.001  # of its skin: blocks that moved less are left out of a 
 MIN_SEAM_COSINE = np.cos(MAX_TILT)  # of the angle between coplanar faces, and between their axes 2
 MAX_SEAM_STEP = 0.05  # of the skin: step between coplanar faces at a seam
 CHECKED_OVERLAP = 0.02  # of the smallest skin: smaller overlaps are not checked
+MAX_SHIFT_PER_SKIN = 0.25  # sum of two skins: shift of a point that keeps its joint on other faces
 MIN_SEEN_FRACTION = 0.5  # of an overlap of two blocks, that the deepest contact must see
-POINT_ARRAYS = ("local_point", "local_frame", "plane_offset", "area")  # with the keys, a point
+POINT_ARRAYS = {  # with the keys, these are a point
+    "plane_is_of_a": bool, "local_point": float, "local_frame": float, "plane_offset": float,
+    "area": float,
+}  # fmt: skip
 
 
 class FacePoints(ContactRows):
     """k contact points of faces on faces as rows, at the present places of the blocks.
 
     keys (3, k): the two faces, and the number of the point among the points of these faces.
-    local_point (k, 3) in m: from the centroid of a, along its axes. local_frame (k, 3, 3): normal
-    of b, axes 2 and 3, along the axes of b. plane_offset (k,) in m: of the face of b from its
-    centroid.
+    plane_is_of_a (k,): whether the plane of the contact is fixed to a, and the point to b; else the
+    other way round. local_point (k, 3) in m: from the centroid of its block, along its axes.
+    local_frame (k, 3, 3), along the axes of the block of the plane: the normal out of this block,
+    and the axes along which the block of the point moves where shears grow: axes 2 and 3 of the
+    law, or their opposites if the plane is of a, so that shears are of a against b. plane_offset
+    (k,) in m: of the plane from the centroid of its block.
     """
 
     def __init__(self, blocks: SpaceBlocks, keys: np.ndarray, **arrays: np.ndarray) -> None:
@@ -54,23 +62,23 @@ class FacePoints(ContactRows):
         super().__init__(**vars(ContactRows.zeros(k, dim=3, dof=6, n_keys=3)))
         self.blocks = blocks
         self.keys[:] = keys
-        for name in POINT_ARRAYS:
-            setattr(self, name, np.ascontiguousarray(arrays[name], float))
+        for name, kind in POINT_ARRAYS.items():
+            setattr(self, name, np.ascontiguousarray(arrays[name], kind))
         self.block_a[:] = blocks.surfaces.block_of_face[self.face_a]
         self.block_b[:] = blocks.surfaces.block_of_face[self.face_b]
         self.arrays = FacePointArrays(n_blocks=len(blocks.names), n_points=k)
         self.arrays.bind(blocks, "motion", "axes")
         self.arrays.bind(
-            self, "block_a", "block_b", "local_point", "local_frame", "plane_offset", "closure",
-            "kinematics",
+            self, "block_a", "block_b", "plane_is_of_a", "local_point", "local_frame",
+            "plane_offset", "closure", "kinematics",
         )  # fmt: skip
         self.update()
 
     @classmethod
     def none(cls, blocks: SpaceBlocks) -> "FacePoints":
         """No points."""
-        sizes = {"local_point": (0, 3), "local_frame": (0, 3, 3), "plane_offset": 0, "area": 0}
-        arrays = {name: np.zeros(size) for name, size in sizes.items()}
+        shapes = {"local_point": (3,), "local_frame": (3, 3)}
+        arrays = {name: np.zeros((0, *shapes.get(name, ()))) for name in POINT_ARRAYS}
         return cls(blocks, np.zeros((3, 0), np.int64), **arrays)
 
     @classmethod
@@ -79,18 +87,20 @@ class FacePoints(ContactRows):
         surfaces = blocks.surfaces
         first = np.searchsorted(points.contact, points.contact)
         keys = np.array([points.face_a, points.face_b, np.arange(len(first)) - first])
-        arm = points.point - surfaces.position[points.block_a]
-        axes = contact_axes(surfaces, points, axis_2)
-        corner = surfaces.corner[surfaces.first_corner[points.face_b]]
-        of_a, of_b = (surfaces.rotation[block] for block in (points.block_a, points.block_b))
+        of_a = points.plane_is_of_a
+        own = np.where(of_a, points.block_b, points.block_a)
+        other = np.where(of_a, points.block_a, points.block_b)
+        arm = points.point - surfaces.position[own]
+        frame = contact_axes(surfaces, points, axis_2)
+        frame[of_a] *= -1.0
+        base = points.base - surfaces.position[other]
         return cls(
             blocks,
             keys,
-            local_point=np.einsum("kji,kj->ki", of_a, arm),
-            local_frame=axes @ of_b,
-            plane_offset=np.einsum(
-                "ki,ki->k", surfaces.local_normal[points.face_b], surfaces.local_vertex[corner]
-            ),
+            plane_is_of_a=of_a,
+            local_point=np.einsum("kji,kj->ki", surfaces.rotation[own], arm),
+            local_frame=frame @ surfaces.rotation[other],
+            plane_offset=np.einsum("ki,ki->k", points.normal, base),
             area=points.area,
         )
 
@@ -105,7 +115,7 @@ class FacePoints(ContactRows):
 
     @property
     def face_a(self) -> np.ndarray:
-        """Face (k,) of block a on which the point lies."""
+        """Face (k,) of block a."""
         return self.keys[0]
 
     @property
@@ -132,13 +142,22 @@ class FacePoints(ContactRows):
     def point(self) -> np.ndarray:
         """Places (k, 3) of the points in m."""
         blocks = self.blocks
-        arm = np.einsum("kij,kj->ki", blocks.axes[self.block_a], self.local_point)
-        return blocks.motion[:3].T[self.block_a] + arm
+        own = np.where(self.plane_is_of_a, self.block_b, self.block_a)
+        arm = np.einsum("kij,kj->ki", blocks.axes[own], self.local_point)
+        return blocks.motion[:3].T[own] + arm
+
+    @property
+    def point_in_a(self) -> np.ndarray:
+        """Places (k, 3) in m from the centroid of block a, along its axes."""
+        arm = self.point - self.blocks.motion[:3].T[self.block_a]
+        return np.einsum("kji,kj->ki", self.blocks.axes[self.block_a], arm)
 
     @property
     def directions(self) -> np.ndarray:
-        """Normal of b, axis 2 and axis 3 (k, 3, 3) of the points."""
-        return np.einsum("kij,kcj->kci", self.blocks.axes[self.block_b], self.local_frame)
+        """Normal from b to a, axis 2 and axis 3 (k, 3, 3) of the points."""
+        other = np.where(self.plane_is_of_a, self.block_a, self.block_b)
+        frame = np.einsum("kij,kcj->kci", self.blocks.axes[other], self.local_frame)
+        return np.where(self.plane_is_of_a[:, None, None], -frame, frame)
 
     def update(self) -> None:
         """Compute closures and kinematics at the present places of the blocks."""
@@ -160,6 +179,7 @@ class FaceContactManager:
         self.max_skin_until_rebuild = MAX_SKIN_UNTIL_REBUILD
         self.skins = scene.skins
         self.max_overlap_fraction = scene.max_overlap
+        self.strip_width = scene.strip_width
         self.max_overlap = scene.max_overlap * blocks.surfaces.width
         self.is_fixed = np.array([block.fixed for block in scene.blocks])
         self.face_laws = FaceLaws(scene, blocks.surfaces)
@@ -191,7 +211,7 @@ class FaceContactManager:
         start of a run. Otherwise the depth becomes its closure offset, so that it brings no energy.
 
         Returns the row (k,) in the list before of the point whose joint each point continues, -1
-        for a new one. Raises SceneError where blocks touch and no faces support them.
+        for a new one. Raises SceneError for overlaps that are too deep, or that no contact sees.
         """
         has_moved = self._blocks_to_rebuild(motion)
         self.blocks.place()
@@ -202,11 +222,13 @@ class FaceContactManager:
         kept = np.flatnonzero(~is_searched)
         searched = np.flatnonzero(is_searched)
         surfaces = self.blocks.surfaces
-        points = find_contacts(surfaces, self.skins, self.max_overlap_fraction, pairs)
+        points = find_contacts(
+            surfaces, self.skins, self.max_overlap_fraction, pairs, self.strip_width
+        )
         law, axis_2 = self.face_laws.law_and_axis(points)
         detected = FacePoints.found(self.blocks, points, axis_2)
-        old_row = _nearest(detected, present, searched)
-        self._require_faces(pairs, detected, searched[~np.isin(searched, old_row)])
+        old_row = self._continued(detected, law, searched)
+        self._require_seen(pairs, detected)
         new_offset = np.maximum(detected.closure, 0.0) * (not keep_closure)
         old_offset = np.append(self.closure_offset, 0.0)[old_row]
         offset = np.where(old_row < 0, new_offset, old_offset)
@@ -230,21 +252,32 @@ class FaceContactManager:
         self.needs_rebuild[:] = False
         return has_moved
 
-    def _require_faces(self, pairs: np.ndarray, found: FacePoints, ended: np.ndarray) -> None:
-        """Refuse blocks that touch where no faces support them.
+    def _continued(self, found: FacePoints, law: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Row (k,) of the present point whose joint each point continues, -1 for a new joint.
 
-        pairs (p, 2): searched pairs of blocks; found: their points; ended: rows of points that no
-        point continues. Raises SceneError.
+        The nearest one of the same two faces. Where a block that stands on an edge rolls on, the
+        edge comes to belong to other faces: the nearest one of the same two blocks, within a part
+        of their skins. law (k,): of the points found; rows (m,): present points to be compared.
         """
-        surfaces = self.blocks.surfaces
         present = self.contacts
-        ended = ended[self.closure[ended] > 0]
-        normal_a, normal_b = surfaces.normal[present.keys[:2, ended]]
-        tilt = np.arccos(np.clip(-np.einsum("ki,ki->k", normal_a, normal_b), -1.0, 1.0))
-        for row in ended[(tilt > MAX_TILT) & ~self.blocks.is_removed[present.block_a[ended]]][:1]:
-            self._refuse_edge(present.block_a[row], present.block_b[row])
+        old_row, _ = _nearest(found, present, rows, found.codes, present.codes)
+        n = len(self.blocks.names)
+        block_pair = found.block_a * n + found.block_b
+        present_pair = present.block_a * n + present.block_b
+        other_row, distance = _nearest(found, present, rows, block_pair, present_pair)
+        reach = MAX_SHIFT_PER_SKIN * (self.skins[found.block_a] + self.skins[found.block_b])
+        is_same_joint = (other_row >= 0) & (distance <= reach)
+        is_same_joint[is_same_joint] &= self.law[other_row[is_same_joint]] == law[is_same_joint]
+        return np.where((old_row < 0) & is_same_joint, other_row, old_row)
+
+    def _require_seen(self, pairs: np.ndarray, found: FacePoints) -> None:
+        """Require that the deepest contact of blocks sees their overlap, and that it is not too
+        deep.
+
+        pairs (p, 2): searched pairs of blocks; found: their points. Raises SceneError.
+        """
         tolerance = CHECKED_OVERLAP * float(self.skins.min())
-        overlap = -surfaces.separations(pairs, tolerance)
+        overlap = -self.blocks.surfaces.separations(pairs, tolerance)
         for i in np.flatnonzero(overlap > tolerance):
             a, b = pairs[i]
             is_pair = (found.block_a == a) & (found.block_b == b)
@@ -252,16 +285,11 @@ class FaceContactManager:
             if overlap[i] > min(self.max_overlap[a], self.max_overlap[b]):
                 self.refuse_overlap((a, b), overlap[i])
             if seen < MIN_SEEN_FRACTION * overlap[i]:
-                self._refuse_edge(a, b)
-
-    def _refuse_edge(self, a: int, b: int) -> None:
-        """Raise SceneError for two blocks that touch along an edge or at a corner."""
-        names = self.blocks.names
-        raise SceneError(
-            f"blocks {names[a]!r} and {names[b]!r} touch along an edge or at a corner, tilted by "
-            f"more than {np.degrees(MAX_TILT):.0f} degrees: blocks in space are in contact by "
-            "their faces only, so this run cannot go on"
-        )
+                names = self.blocks.names
+                raise SceneError(
+                    f"blocks {names[a]!r} and {names[b]!r} overlap by {overlap[i]:.3g} m, of which "
+                    f"their contacts see {seen:.3g} m: resume with a smaller step"
+                )
 
     def refuse_overlap(self, pair, depth: float) -> None:
         """Raise SceneError for an overlap (m) of two blocks beyond run.max_overlap."""
@@ -323,24 +351,33 @@ class FaceContactManager:
         return (contacts.block_a == min(one, other)) & (contacts.block_b == max(one, other))
 
 
-def _nearest(found: FacePoints, present: FacePoints, rows: np.ndarray) -> np.ndarray:
-    """Row (k,) of the nearest present point of the same two faces, -1 where there is none.
+def _nearest(
+    found: FacePoints,
+    present: FacePoints,
+    rows: np.ndarray,
+    code: np.ndarray,
+    present_code: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Row (k,) of the nearest present point with the same code, -1 where there is none, and its
+    distance (k,) in m.
 
-    rows (m,): present points to be compared; distances are in the frame of block a.
+    rows (m,): present points to be compared; code (k,), present_code: of points found and present.
+    Distances are in the frame of block a.
     """
-    order = rows[np.argsort(present.codes[rows], kind="stable")]
-    known = present.codes[order]
-    first = np.searchsorted(known, found.codes)
-    last = np.searchsorted(known, found.codes, side="right")
+    order = rows[np.argsort(present_code[rows], kind="stable")]
+    known = present_code[order]
+    first = np.searchsorted(known, code)
+    last = np.searchsorted(known, code, side="right")
+    place_before = present.point_in_a
+    place_now = found.point_in_a
     nearest = np.full(len(first), -1)
     smallest = np.full(len(first), np.inf)
     for number in range(int((last - first).max(initial=0))):
         has_one = first + number < last
         row = order[first[has_one] + number]
-        arm = present.local_point[row] - found.local_point[has_one]
-        distance = (arm**2).sum(axis=1)
+        distance = np.linalg.norm(place_before[row] - place_now[has_one], axis=1)
         is_nearer = distance < smallest[has_one]
         place = np.flatnonzero(has_one)[is_nearer]
         nearest[place] = row[is_nearer]
         smallest[place] = distance[is_nearer]
-    return nearest
+    return nearest, smallest

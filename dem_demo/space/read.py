@@ -102,6 +102,7 @@ def build(
         top.get("title", where), tuple(blocks), laws, default, top.get("rough", 0.0), pairs,
         tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
         top["gravity"], top["seismic"], skin=top["run"].get("skin"),
+        corner_length=top["run"].get("corner_length"),
         max_overlap=top["run"].get("max_overlap", MAX_OVERLAP), water=water, in_situ=in_situ,
         pressure=pressure, stages=stages,
         water_changes=read_water_changes(top.get("water", {}), where),
@@ -120,9 +121,9 @@ def build(
 
 def _run(table: Tables, where: str) -> Run | None:
     """Build the settings of a run, None if the blocks do not move. Raises ValueError."""
-    motion_keys = sorted({*table} - {"skin", "max_overlap", "end"})
+    motion_keys = sorted({*table} - {"skin", "max_overlap", "corner_length", "end"})
     if "end" in table:
-        return Run(**table, corner_length=0.0, soft=0.0)
+        return Run(**{"corner_length": 0.0, "soft": 0.0} | table)
     if motion_keys:
         raise ValueError(
             f"{where}: run.end is missing, without which the blocks do not move: give it in s, or "

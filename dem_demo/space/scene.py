@@ -9,6 +9,7 @@ import numpy as np
 import jointlaw as jl
 
 from ..scene import Bolt, Drive, Files, Run, Tables
+from ..scene.read import CORNER_LENGTH_PER_WIDTH, SLIVER_PER_WIDTH
 from ..scene.scene import MAX_SKIN_PER_WIDTH, SKIN_PER_MEDIAN_WIDTH, base_of
 from .loads import SpaceStress
 from .solids import Solid
@@ -93,7 +94,8 @@ class SpaceScene:
     excavation stages, each with its `blocks`, its `start` (s; None: once the rock is at rest) and
     its `release_time` (s). removed: blocks that are absent from the beginning.
 
-    skin: range (m) of contact detection, None for the default. max_overlap: deepest
+    skin: range (m) of contact detection, None for the default. corner_length: width (m) of the
+    joint along an edge that a block stands on, None for the default. max_overlap: deepest
     contact, as a fraction of the width of the narrower block. reduction: strength reduction factor
     of all joints. run: settings of a run, None for a scene whose blocks do not move. drives:
     prescribed motions. points: history points, as (block, position in m).
@@ -117,6 +119,7 @@ class SpaceScene:
     removed: tuple[int, ...] = ()
     water_changes: tuple[tuple[float, np.ndarray], ...] = ()
     skin: float | None = None
+    corner_length: float | None = None
     max_overlap: float = MAX_OVERLAP
     reduction: float = 1.0
     run: Run | None = None
@@ -146,6 +149,19 @@ class SpaceScene:
         In a shaken scene it is a block that moves with all fixed rock, not by a drive of its own.
         """
         return base_of(self.blocks, self.drives, {*self.removed})
+
+    @property
+    def strip_width(self) -> float:
+        """Width (m) of the joint along an edge that a block stands on.
+
+        By default a tenth of the narrowest block, or of 0.7 of the median width of the blocks that
+        are not fixed, if that is more.
+        """
+        if self.corner_length is not None:
+            return self.corner_length
+        widths = [block.solid.width for block in self.blocks]
+        median = np.median([block.solid.width for block in self.blocks if not block.fixed])
+        return CORNER_LENGTH_PER_WIDTH * max(min(widths), SLIVER_PER_WIDTH * float(median))
 
     @property
     def acceleration(self) -> np.ndarray:

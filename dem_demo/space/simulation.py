@@ -1,4 +1,4 @@
-"""A scene in space in motion: the simulation of the plane with the contacts of faces.
+"""A scene in space in motion: the simulation of the plane with the contacts in space.
 
 Time step, energy balance, excavation, drives and saved states are written once, for blocks with 3
 motions and with 6 (`dynamics/simulation.py`). This module replaces what depends on the geometry.

@@ -127,7 +127,9 @@ class Statics:
         require_apart(self.surfaces, [block.name for block in blocks], scene.skins, self.is_removed)
         pairs = self.surfaces.near_pairs(scene.skins)
         pairs = pairs[~self.is_removed[pairs].any(axis=1)]
-        self.points = find_contacts(self.surfaces, scene.skins, scene.max_overlap, pairs)
+        self.points = find_contacts(
+            self.surfaces, scene.skins, scene.max_overlap, pairs, scene.strip_width
+        )
         self.law, axis_2 = FaceLaws(scene, self.surfaces).law_and_axis(self.points)
         self.axes = contact_axes(self.surfaces, self.points, axis_2)
         self.rows = contact_rows(self.surfaces, self.points, self.axes)
@@ -150,7 +152,7 @@ class Statics:
 
     @property
     def untouched(self) -> np.ndarray:
-        """Free blocks (n,) without a contact of faces."""
+        """Free blocks (n,) that touch no other block."""
         touched = np.zeros(len(self.is_free), bool)
         touched[self.rows.block_a] = True
         touched[self.rows.block_b] = True

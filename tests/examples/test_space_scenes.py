@@ -83,7 +83,7 @@ def test_a_run_writes_tables_and_vtk_files(tmp_path, capsys):
     """The files hold the blocks with their displacements, and contacts with their tractions."""
     assert main(["wall-3d", "--vtk", "--no-pictures", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert "27 free blocks, 66 contacts of faces, 264 contact points" in printed
+    assert "27 free blocks, 66 contacts, 264 contact points" in printed
     assert "no [run] with an end: the run ends with the static equilibrium" in printed
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["equilibrium"] == "in equilibrium"
@@ -161,13 +161,14 @@ def test_wedges_in_motion(name, tmp_path, capsys):
         )
 
 
-def test_check_lists_blocks_that_stand_on_an_edge(tmp_path, capsys):
-    """A prism on its edge: no contact of faces supports it."""
+def test_check_lists_blocks_that_touch_nothing_and_blocks_that_tip_over_an_edge(tmp_path, capsys):
+    """A prism beside the point above its edge, and another one in the air."""
     edge = [[x, 0.0, 0.5] for x in (-0.5, 0.5)]
-    top = [[x, y, 1.2] for x in (-0.5, 0.5) for y in (-0.7, 0.7)]
+    top = [[x, y, 1.2] for x in (-0.5, 0.5) for y in (-0.6, 0.7)]
     text = "[laws.joint]\n" + coulomb(0.6) + block("base", box=[4, 4, 1], fixed=True)
+    text += block("high", box=[1, 1, 1], at=[0, 0, 5])
     (tmp_path / "prism.toml").write_text(text + block("prism", corners=edge + top))
     assert main(["check", str(tmp_path / "prism.toml")]) == 0
     printed = capsys.readouterr().out
-    assert "without a contact of faces, so that nothing supports them: prism (0.00, 0.00" in printed
-    assert "1 block has no static equilibrium: prism" in printed
+    assert "touch nothing, so that nothing supports them: high (0.00, 0.00, 5.00)\n" in printed
+    assert "2 blocks have no static equilibrium: high (0.00, 0.00, 5.00), prism" in printed

@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 from shapely import Polygon
 
 from dem_demo.space.contacts import (
-    MAX_TILT,
     Surfaces,
     contact_axes,
     contact_rows,
@@ -110,12 +109,6 @@ def test_points_of_tilted_faces_lie_on_face_a(tilt):
         assert np.abs(height).max() < 1e-14
         rows = rows_of(surfaces, points, [0.0, 1.0, 0.0])
         assert np.ptp(rows.closure) == pytest.approx(np.sin(np.radians(tilt)), rel=0.05)
-
-
-def test_faces_tilted_beyond_two_degrees_are_no_contact():
-    surfaces = surfaces_of(BASE, box([1.0, 1.0, 1.0], [0.0, 0.0, 0.5]))
-    move(surfaces, 1, [0.0, 0.0, 0.0], [1.01 * MAX_TILT, 0.0, 0.0])
-    assert not len(find_contacts(surfaces, np.full(2, REACH), 0.1).area)
 
 
 def test_the_number_of_points_does_not_depend_on_rounding():

@@ -28,6 +28,11 @@ LAWS = {"plain": PLAIN, "strong": STRONG}
 BASE = {"name": "base", "box": [4.0, 4.0, 1.0], "at": [0.5, 0.4, -0.5], "fixed": True}
 ONE = {"name": "one", "box": [1.0, 0.8, 0.5], "at": [0.0, 0.0, 0.25]}
 TWO = {"name": "two", "box": [0.5, 0.6, 0.4], "at": [0.1, 0.0, 0.7]}
+ON_EDGE = {
+    "name": "on edge",
+    "corners": [[0.0, y, 0.0] for y in (-0.3, 0.3)]
+    + [[x, y, 0.5] for x in (-0.5, 0.6) for y in (-0.3, 0.3)],
+}
 CORNERS = [[x, y, z] for x in (-0.1, 0.3) for y in (-0.2, 0.2) for z in (0.5, 0.9)]
 BLOCKS = {
     "title": "blocks",
@@ -243,6 +248,11 @@ PROBES = {  # path of the key: scene, where the key is in it, another value
     "run.dashpot_normal": (MOVING, "run.dashpot_normal", 0.1),
     "run.dashpot_shear": (MOVING, "run.dashpot_shear", 0.1),
     "run.law_steps": (MOVING, "run.law_steps", 2),
+    "run.corner_length": (
+        BLOCKS | {"block": [BASE, ON_EDGE], "run": {"corner_length": 0.02}},
+        "run.corner_length",
+        0.03,
+    ),
     "run.skin": (
         BLOCKS | {"block": [BASE, ONE, TWO | {"at": [0.1, 0.0, 0.71]}], "run": {"skin": 0.1}},
         "run.skin",

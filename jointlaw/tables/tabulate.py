@@ -110,6 +110,9 @@ def _metadata(
         "yielding": "first loading only: asperities yield, and unloading leaves a plastic closure"
         if law.tables.yields
         else "none",
+        "degradation": "first loading only: slopes that decreased by stress stay so in unloading"
+        if law.tables.degrades_by_stress
+        else "none",
         "bond": "left out: this is the joint without its bond"
         if isinstance(law, JointLaw) and law.bond is not None
         else "none",

@@ -165,6 +165,21 @@ def test_tolerances_hold_on_paths_that_the_search_does_not_use(name):
     assert sliders == sorted(sliders)
 
 
+def test_the_tolerance_holds_where_slopes_decrease_by_stress():
+    """On random paths that reach a third of the slopes."""
+    base = jl.presets.load("westerly-smooth")
+    size = base.closure_range
+    stress = 0.3 * float(base.normal_stress(size))
+    changes = {"plane": 0.0, "mating_length": 10 * size, "closure_range": size}
+    law = replace(base, degradation_stress=stress, **changes)
+    joint = law.joint()
+    joint.update([size, 0.0])
+    assert joint.slope_retention < 0.35
+    adapted = law.at_tolerance(0.02)
+    assert adapted.resolution.sliders > law.at_tolerance(0.05).resolution.sliders
+    assert 0.05 < error_ratios(adapted, law, 6, 0.02).max() <= 1.0
+
+
 def test_closure_only_uses_paths_of_closure_alone():
     law = replace(jl.presets.load("westerly-rough"), closure_only=True)
     adapted = law.at_tolerance(0.01)

@@ -125,6 +125,30 @@ def test_an_invalid_table_file_is_refused_by_name(tmp_path, name, old, new, word
         jl.load_table(path)
 
 
+def test_a_table_of_a_law_that_degrades_by_stress_has_the_stated_errors(law):
+    """Of the normal stress 1e-3, of the initial shear stiffness and the peak 0.5 %."""
+    end = law.closure_range
+    stress = 0.3 * float(law.normal_stress(end))
+    changes = {"mating_length": 20 * end, "degradation_stress": stress, "closure_range": end}
+    degrading = replace(law, **changes)
+    table = jl.tabulate(degrading, shear_limit=2 * end)
+    assert table.metadata["degradation"].startswith("first loading only")
+    u = np.random.default_rng(0).uniform(0, 1, 3000) ** 3 * end
+    exact = degrading.normal_stress(u)
+    tolerance = 1.05e-3 * np.maximum(exact, 1e-4 * exact.max())
+    assert (np.abs(table.lookup(u).normal_stress - exact) < tolerance).all()
+    u = 0.5 * end
+    joint = degrading.joint(float(degrading.normal_stress(u)))
+    assert joint.slope_retention < 0.7
+    probe = np.array([0.0, 1e-4 * u, 0.0])
+    stiffness = (joint.trial(probe)[0] - joint.trial(-probe)[0])[1] / (2 * probe[1])
+    row = table.lookup(u)
+    assert row.shear_stiffness == pytest.approx(stiffness, rel=2e-3)
+    record = jl.direct_shear(joint, 2 * end, normal=float(joint.F[0]), steps=120)
+    peak = np.tan(np.radians(record.peak_friction_angle))
+    assert row.peak_friction == pytest.approx(peak, rel=5e-3)
+
+
 def test_report_states_the_errors_of_a_table(law, table):
     """Pure closure is exact; unloading, coupling and reversal show as errors.
 

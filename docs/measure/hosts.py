@@ -1,6 +1,6 @@
 """Cost per contact and step in the particle codes LAMMPS and YADE, compared with their own laws.
 
-    python docs/measure/hosts.py lammps FOLDER [--rounds 2] [--steps 60] [--settle 60] [--repeat 2]
+    python docs/measure/hosts.py lammps FOLDER [--rounds 3] [--steps 40] [--settle 40] [--repeat 2]
     python docs/measure/hosts.py lammps-scale FOLDER [--small]
     python docs/measure/hosts.py yade [--contacts 20000] [--runs 60] [--preset jing-replica]
 
@@ -31,6 +31,7 @@ from jointlaw.parameters.resolution import NAMED_RESOLUTIONS
 ENVIRONMENT = Path(os.environ.get("ENV", sys.prefix))
 RESOLUTIONS = "fast", "balanced", "fine"
 MINDLIN = "granular, mindlin"
+RECORD_SIZE = 12  # numbers of a joint beside its state: EXTRA_SIZE in jointlawplugin.cpp
 COULOMB = jl.CoulombLaw(normal_stiffness=1.0e9, shear_stiffness=0.83e9, friction=0.4)
 SCALE_STEPS = 20  # steps that settle, and steps that are timed; half as many after a restart
 CLUSTER_CONTACTS = 1e8
@@ -226,52 +227,61 @@ print("RESULT " + json.dumps(results), flush=True)
 """
 
 
-def lammps(folder: Path, rounds=2, steps=60, settle=60, repeat=2):
+def lammps(folder: Path, rounds=3, steps=40, settle=40, repeat=2):
     """ns per contact and step of pair_style jointlaw in a packing, and of LAMMPS' own styles.
 
     Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after
-    another in every round; the shortest time of all rounds counts. Times on one processor are
-    processor time, as LAMMPS counts it; times on two are valid only on an idle machine.
+    another in every round; the shortest time of all rounds counts. Processor time of one process,
+    as LAMMPS counts it.
     """
     prepare_packing(folder)
-    laws = {f"jointlaw, {resolution}": lammps_law(resolution) for resolution in RESOLUTIONS}
-    laws["jointlaw, Coulomb"] = COULOMB
+    balanced = lammps_law("balanced")
+    laws = {
+        "jointlaw, Coulomb": (COULOMB, ""),
+        "jointlaw, fast": (lammps_law("fast"), ""),
+        "jointlaw, balanced": (balanced, ""),
+        "jointlaw, balanced, with damping": (balanced, "damping 0.5"),
+        "jointlaw, balanced, with yielding, degradation and bond": (with_all_parts(balanced), ""),
+        "jointlaw, fine": (lammps_law("fine"), ""),
+    }
     styles = dict(LAMMPS_STYLES)
     sizes = {}
-    for index, (name, law) in enumerate(laws.items()):
+    for index, (name, (law, keywords)) in enumerate(laws.items()):
         file = f"law-{index}.jlaw"
         (folder / file).write_text(table_text(law))
         commands = [
             "plugin load ./jointlawplugin.so",
-            "pair_style jointlaw opening 5e-4",
+            f"pair_style jointlaw opening 5e-4 {keywords}",
             f"pair_coeff * * {file}",
         ]
         styles[name] = "on", "\n".join(commands)
-        sizes[name] = 8 * (law.state_size + 8)
+        sizes[name] = 8 * (law.state_size + RECORD_SIZE)
     runs = defaultdict(list)
     for _ in range(rounds):
         for name, (newton, style) in styles.items():
             script = TIMING_SCRIPT.format(
                 newton=newton, style=style, steps=steps, settle=settle, repeat=repeat
             )
-            for processors in (1, 2):
-                log = run_lammps(folder, script, processors)
-                contacts = last_number(r"^ +\d+ +(\S+) +\S+ *$", log) / 2
-                pair_time, step_time = run_times(log, processors)
-                scale = 1e9 / steps / contacts
-                runs[name, processors].append([scale * pair_time, scale * step_time, contacts])
-    shortest = {case: np.min(results, axis=0) for case, results in runs.items()}
+            log = run_lammps(folder, script)
+            contacts = last_number(r"^ +\d+ +(\S+) +\S+ *$", log) / 2
+            scale = 1e9 / steps / contacts
+            runs[name].append([*(scale * time for time in run_times(log, 1)), contacts])
+    shortest = {name: np.min(results, axis=0) for name, results in runs.items()}
+    mindlin_pair, mindlin_step, _ = shortest[MINDLIN]
     rows = []
-    for name in styles:
-        pair, step, contacts = shortest[name, 1]
-        parallel_pair, parallel_step, _ = shortest[name, 2]
-        ratio = pair / shortest[MINDLIN, 1][0]
-        rows.append([name, f"{contacts:.0f}", f"{pair:.0f}", f"{ratio:.2f}", f"{step:.0f}",
-                     f"{parallel_pair:.0f}", f"{step / parallel_step:.2f}",
-                     sizes.get(name, "")])  # fmt: skip
+    for name, (pair, step, contacts) in shortest.items():
+        rows.append([name, f"{contacts:.0f}", f"{pair:.0f}", f"{pair / mindlin_pair:.2f}",
+                     f"{step:.0f}", f"{step / mindlin_step:.2f}", sizes.get(name, "")])  # fmt: skip
     print_table(["pair style, resolution", "contacts", "pair style, ns per contact and step",
-                 "pair style / mindlin", "whole step, ns", "2 processors: pair style, ns",
-                 "speed-up of the step", "bytes per contact"], rows)  # fmt: skip
+                 "pair style / mindlin", "whole step, ns", "step / mindlin",
+                 "bytes per contact"], rows)  # fmt: skip
+
+
+def with_all_parts(law):
+    """The law with plastic asperities, degradation of slopes by work, and a bond."""
+    asperity = replace(law.asperity, yield_interference=2e-4)
+    bond = jl.Bond(normal_stiffness=5e8, shear_stiffness=5e8, tension=1e4, cohesion=1e4)
+    return replace(law, asperity=asperity, slope_wear=50.0, slope_residual=0.2, bond=bond)
 
 
 def lammps_law(resolution):

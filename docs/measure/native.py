@@ -184,37 +184,43 @@ def batch_size(rounds=60):
 
 
 def joint_lists(rounds=60):
-    """Nanoseconds per listed joint of an update with `where`, at "balanced" in space.
+    """Nanoseconds per listed joint of an update with `where`, and ratios to the whole batch.
 
-    Traction alone, without the dissipated energy, in processor time of one thread; the shortest of
-    many rounds taken in turn. Each figure is followed by its ratio to the whole batch in
-    parentheses. Two minutes.
+    The resolution "balanced" in space, and Coulomb's law; traction alone, without the dissipated
+    energy, in processor time of one thread; the shortest of many rounds taken in turn. Three
+    minutes.
     """
-    law = replace(jl.presets.load("westerly-smooth"), resolution="balanced", plane=None)
+    preset = jl.presets.load("westerly-smooth")
+    laws = {
+        "balanced": replace(preset, resolution="balanced", plane=None),
+        "Coulomb": jl.CoulombLaw(normal_stiffness=1e10, shear_stiffness=5e9, friction=0.6),
+    }
     rng = np.random.default_rng(1)
     rows = []
-    for n in (300, 2000, 20_000, 100_000, 1_000_000):
-        batch = law.joints(n, track_dissipation=False)
-        increment = rng.normal(0.0, 2e-8, (n, law.dim))
-        batch.update(increment + 1e-6 * np.eye(law.dim)[0], tangent=False)
-        permutation = rng.permutation(n)
-        lists = {
-            "all, no `where`": None,
-            "all, in order": np.arange(n),
-            "1 in 50 left out": np.sort(permutation[n // 50 :]),
-            "all, any order": permutation,
-            "half, in order": np.sort(permutation[: n // 2]),
-            "half, any order": permutation[: n // 2],
-            "1 in 8, in order": np.sort(permutation[: n // 8]),
-        }
-        cases = {
-            name: partial(list_time, batch, cycle(listed_steps(increment, where)), where)
-            for name, where in lists.items()
-        }
-        times = shortest_times(cases, max(rounds * 5000 // n, 8))
-        whole, *others = times.values()
-        rows.append([n, f"{whole:.0f}", *(f"{ns:.0f} ({ns / whole:.2f})" for ns in others)])
-    print_table(["joints", *lists], rows)
+    for law_name, law in laws.items():
+        for n in (300, 2000, 20_000, 100_000, 1_000_000):
+            batch = law.joints(n, track_dissipation=False)
+            increment = rng.normal(0.0, 2e-8, (n, law.dim))
+            batch.update(increment + 1e-6 * np.eye(law.dim)[0], tangent=False)
+            permutation = rng.permutation(n)
+            lists = {
+                "all, no `where`": None,
+                "all, in order": np.arange(n),
+                "1 in 50 left out": np.sort(permutation[n // 50 :]),
+                "all, any order": permutation,
+                "half, in order": np.sort(permutation[: n // 2]),
+                "half, any order": permutation[: n // 2],
+                "1 in 8, in order": np.sort(permutation[: n // 8]),
+            }
+            cases = {
+                name: partial(list_time, batch, cycle(listed_steps(increment, where)), where)
+                for name, where in lists.items()
+            }
+            times = shortest_times(cases, max(rounds * 5000 // n, 8))
+            whole, *others = times.values()
+            ratios = (f"{ns:.0f} ({ns / whole:.2f})" for ns in others)
+            rows.append([law_name, n, f"{whole:.0f}", *ratios])
+    print_table(["law", "joints", *lists], rows)
 
 
 def listed_steps(increment, where):

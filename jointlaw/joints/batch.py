@@ -21,11 +21,12 @@ from ..kernels.admissible import require_admissible_states
 from ..kernels.element import Measures
 from ..kernels.engine import (
     JOINTS_PER_BLOCK,
+    ListVerdict,
     Step,
     allocate_blocks,
     block_index,
     engine,
-    is_increasing,
+    require_valid_list,
 )
 from ..support.checks import Array, integer, numbers
 from .state import JointState, NonFiniteError
@@ -118,13 +119,15 @@ class JointBatch:
         return self._step(d, where, tangent, commit=False)
 
     def _step(self, d: ArrayLike, where: Index | None, tangent: bool, commit: bool) -> Result:
-        index = None if where is None else self._index(where)
+        index, verdict = (None, None) if where is None else self._checked_list(where)
         m = self._n if index is None else len(index)
         dim = self.law.dim
         values = increments(d, (m, dim))
         F = np.empty((m, dim))
         C = np.empty((m, dim, dim)) if tangent else None
-        self.advance(Step(np.ascontiguousarray(values), F, C, index, commit))
+        step = Step(np.ascontiguousarray(values), F, C, index, commit)
+        step.list_verdict = verdict
+        self.advance(step)
         return F, C
 
     def advance(self, step: Step) -> None:
@@ -347,24 +350,21 @@ class JointBatch:
         return self._engine.unpack(self._state[block_index(self._state, index, rows)])
 
     def _index(self, where: Index) -> NDArray[np.intp]:
+        return self._checked_list(where)[0]
+
+    def _checked_list(self, where: Index) -> tuple[NDArray[np.intp], int]:
+        """Numbers of the joints `where`, and whether they increase (`ListVerdict`)."""
         index = np.asarray(where)
         if index.dtype == bool:
             if index.shape != (self._n,):
                 raise ValueError(f"where has shape {index.shape}; a mask needs ({self._n},)")
-            return np.flatnonzero(index)
+            return np.flatnonzero(index), ListVerdict.INCREASING
         if index.size == 0:
-            return np.empty(0, np.intp)
-        if index.ndim != 1 or not np.issubdtype(index.dtype, np.integer):
+            return np.empty(0, np.intp), ListVerdict.INCREASING
+        if index.ndim != 1 or index.dtype.kind not in "iu":
             raise ValueError("where must be a one-dimensional array of joint numbers or a mask")
-        increases = is_increasing(index)  # such a list names no joint twice
-        lowest = int(index[0] if increases else index.min())
-        highest = int(index[-1] if increases else index.max())
-        if lowest < 0 or highest >= self._n:
-            invalid = lowest if lowest < 0 else highest
-            raise ValueError(f"where names joint {invalid}; joints are 0 to {self._n - 1}")
-        if not increases and np.bincount(index).max() > 1:
-            raise ValueError("where names a joint twice; each joint takes one increment per step")
-        return np.ascontiguousarray(index, np.intp)
+        joints = np.ascontiguousarray(index, np.intp)
+        return joints, require_valid_list(self._engine, joints, self._n)
 
     def _closure_bound_after(self, step: Step) -> float:
         """Upper bound (m) of |y| over all joints and facets after a step.

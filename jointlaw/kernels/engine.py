@@ -19,6 +19,7 @@ import ctypes
 import math
 import os
 import warnings
+from enum import IntEnum
 from functools import lru_cache, partial
 from typing import Any
 
@@ -64,9 +65,13 @@ def block_index(state: Array, joints: Index, rows: Any = slice(None)) -> tuple[I
     return block, rows, lane
 
 
-def is_increasing(joints: Index) -> bool:
-    """Whether each of these joint numbers is larger than the one before."""
-    return bool((joints[1:] > joints[:-1]).all())
+class ListVerdict(IntEnum):
+    """Verdict on a list of joints (batch.h); the first two are valid lists."""
+
+    INCREASING = 1
+    ANY_ORDER = 0
+    OUTSIDE = -1  # names a joint that is not in the batch
+    REPEATED = -2  # names a joint twice
 
 
 class Step:
@@ -99,12 +104,29 @@ class Step:
         self.measures = measures
         self.where = where
         self.commit = commit
+        # verdict on `where`, if the caller has checked it for the batch: `ListVerdict`
+        self.list_verdict: int | None = None
         # the states of the last call, the call, its address, and the arrays that it refers to:
         # `NativeEngine`
         self.call: tuple[Array | None, Any, int, Any] = None, None, 0, None
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"call": (None, None, 0, None)}  # a call holds addresses
+
+
+def require_valid_list(kernel: "NumpyEngine | NativeEngine", joints: Index, count: int) -> int:
+    """The verdict on a list of joints (m,) of a batch of `count`: `ListVerdict`.
+
+    Raises ValueError if it names a joint twice or a joint outside the batch.
+    """
+    verdict = kernel.check_list(joints, count)
+    if verdict == ListVerdict.OUTSIDE:
+        lowest = int(joints.min())
+        invalid = lowest if lowest < 0 else int(joints.max())
+        raise ValueError(f"where names joint {invalid}; joints are 0 to {count - 1}")
+    if verdict == ListVerdict.REPEATED:
+        raise ValueError("where names a joint twice; each joint takes one increment per step")
+    return verdict
 
 
 def engine(tables: LawTables, float_sliders: bool = False) -> "NumpyEngine | NativeEngine":
@@ -186,6 +208,8 @@ class NumpyEngine(StateRows):
     def advance(self, state: Array, step: Step, track_dissipation: bool) -> None:
         """Advance joints by a step; the dissipated energy is always tracked."""
         joints = np.arange(len(step.d)) if step.where is None else step.where
+        if step.where is not None and step.list_verdict is None:
+            require_valid_list(self, joints, state.shape[0] * state.shape[2])
         for first in range(0, len(step.d), JOINTS_PER_NUMPY_CALL):
             part = slice(first, first + JOINTS_PER_NUMPY_CALL)
             index = block_index(state, joints[part])
@@ -202,6 +226,16 @@ class NumpyEngine(StateRows):
                 damage = reference.damage(self.tables, new)
                 rows = [*measures, new[dim], damage, *new[:dim]]
                 step.measures[part] = np.stack(rows).T
+
+    def check_list(self, joints: Index, count: int) -> ListVerdict:
+        """Verdict on a list of joints (m,) of a batch of `count`, contiguous, by `ListVerdict`."""
+        if len(joints) and not 0 <= joints.min() <= joints.max() < count:
+            return ListVerdict.OUTSIDE
+        if (joints[1:] > joints[:-1]).all():
+            return ListVerdict.INCREASING
+        if np.bincount(joints).max() > 1:
+            return ListVerdict.REPEATED
+        return ListVerdict.ANY_ORDER
 
     def refresh(self, state: Array, n: int) -> None:
         """Do nothing: a block has no other rows than its states."""
@@ -237,6 +271,7 @@ class NativeEngine(StateRows):
         self._sliders = tables.sliders
         self._library_run = loaded.jlaw_run
         self._library_sort = loaded.jlaw_sort_by_block
+        self._library_check = loaded.jlaw_check_list
         self.lanes = library.vector_lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets; with plastic indentation,
         # Phi and Phi' at the indentation too
@@ -247,7 +282,7 @@ class NativeEngine(StateRows):
         """Advance joints by a step; without `track_dissipation` it stays as it is in the state."""
         state_of_call, call, call_address, _ = step.call
         if state_of_call is not state:
-            arrays = step.d, step.F, step.C, step.measures, *self._sort_by_block(state, step.where)
+            arrays = step.d, step.F, step.C, step.measures, *self._sort_by_block(state, step)
             call = self._prepare_call(state, len(step.d), *map(address, arrays))
             call_address = ctypes.addressof(call)
             step.call = state, call, call_address, arrays
@@ -258,6 +293,13 @@ class NativeEngine(StateRows):
             self._work(call_address, library.ADVANCE)
         else:
             self._run(library.ADVANCE, call)
+
+    def check_list(self, joints: Index, count: int) -> int:
+        """As `NumpyEngine.check_list`."""
+        verdict: int = self._library_check(address(joints), len(joints), count)
+        if verdict < ListVerdict.REPEATED:
+            raise MemoryError("no memory to check a list of joints")
+        return verdict
 
     def refresh(self, state: Array, n: int) -> None:
         """Compute Phi and Phi' in the blocks of the first n states from these states."""
@@ -274,24 +316,27 @@ class NativeEngine(StateRows):
         self._run(operation, self._prepare_call(state, n, None, address(out)))
         return out
 
-    def _sort_by_block(
-        self, state: Array, where: Index | None
-    ) -> tuple[Index | None, Index | None]:
-        """The joints `where` sorted by block, and their places in `where`, None if sorted."""
+    def _sort_by_block(self, state: Array, step: Step) -> tuple[Index | None, Index | None]:
+        """The joints of a step sorted by block, and their places in its list, None if sorted.
+
+        Raises ValueError for a list that names a joint twice or a joint outside the batch.
+        """
+        where = step.where
         if where is None:
             return None, None
         blocks, _, lanes = state.shape
-        if lanes == 1 or is_increasing(where):
+        verdict = step.list_verdict
+        if verdict is None:
+            verdict = require_valid_list(self, where, blocks * lanes)
+        if lanes == 1 or verdict == ListVerdict.INCREASING:
             return where, None
         if len(where) < blocks // JOINTS_PER_BLOCK:  # the library counts the joints of every block
             order = np.argsort(where)
             return where[order], order
-        counts = np.zeros(blocks + 1, np.int64)
-        joints = np.empty_like(where)
-        places = np.empty_like(where)
-        self._library_sort(
-            address(where), len(where), address(counts), blocks, address(joints), address(places)
-        )
+        joints_and_places = np.empty((2, len(where)), np.intp)
+        if self._library_sort(address(where), len(where), blocks, address(joints_and_places)):
+            raise MemoryError("no memory to sort a list of joints")
+        joints, places = joints_and_places
         return joints, places
 
     def _prepare_call(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:

@@ -10,8 +10,8 @@
  * Three things follow from this layout. A list of joints (b->index) is sorted by block. A block with
  * many listed joints is advanced as a whole, and the states of its other joints are restored.
  * Where few joints of a block are listed, joints of several blocks are gathered into a copy,
- * advanced, and copied back. A trial step (b->commit = 0) advances a copy of the block, so the
- * states do not change. While a block is advanced the next one is prefetched, which hides the
+ * advanced, and copied back (copy_lanes: one shuffle per row). A trial step (b->commit = 0) advances
+ * a copy of the block, so the states do not change. While a block is advanced the next one is prefetched, which hides the
  * latency of memory for batches larger than the cache.
  *
  * A batch also keeps, in the rows after the state, Phi and Phi' of the first-loading curve of every
@@ -46,7 +46,7 @@
 #endif
 
 enum {
-  MAX_GATHERED_OF_BLOCK = 5, /* listed joints of a block up to which gathering them is faster */
+  MAX_GATHERED_OF_BLOCK = 6, /* listed joints of a block up to which gathering them is faster */
   NOT_LISTED = -1
 };
 
@@ -130,11 +130,51 @@ static int advance_all(const jlaw_batch *b, long first, long last)
   return 0;
 }
 
+/* Sets of lanes of a block: bit l is set if lane l belongs to it */
+enum { ALL_LANES = (1 << BLOCK) - 1 };
+
+static int count_lanes(int lanes)
+{
+  int count = 0;
+  for (; lanes; lanes &= lanes - 1) count++;
+  return count;
+}
+
+/* Copy the states of these joints of a block to other lanes of another block, in the same order:
+ * as many lanes in `to_lanes` as in `from_lanes` */
+static void copy_lanes(const double *from, int from_lanes, double *to, int to_lanes, size_t rows)
+{
+  int source[BLOCK] = {0}; /* lane of `from` for each lane of `to` */
+  for (int l = 0, k = 0; l < BLOCK; l++) {
+    if (!(to_lanes >> l & 1)) continue;
+    while (!(from_lanes >> k & 1)) k++;
+    source[l] = k++;
+  }
+#if defined(__AVX512F__) && JL_W == 8 && !defined(JLAW_FACET_VECTORS) /* a row by one shuffle */
+  const __m512i order = _mm512_cvtepi32_epi64(_mm256_loadu_si256((const __m256i *) source));
+  for (size_t r = 0; r < rows; r++, from += BLOCK, to += BLOCK)
+    _mm512_mask_storeu_pd(to, (__mmask8) to_lanes,
+                          _mm512_permutexvar_pd(order, _mm512_loadu_pd(from)));
+#else
+  for (int l = 0; l < BLOCK; l++)
+    for (size_t r = 0; to_lanes >> l & 1 && r < rows; r++)
+      to[r * BLOCK + (size_t) l] = from[r * BLOCK + (size_t) source[l]];
+#endif
+}
+
 typedef struct { /* listed joints in the lanes of a block of states */
-  int count;
-  long long joint[BLOCK];
+  int lanes;       /* set of lanes that hold a listed joint */
   long row[BLOCK]; /* of d, F, C and measures, or NOT_LISTED */
 } joint_group;
+
+typedef struct { /* a group whose joints were gathered from several blocks */
+  joint_group group;
+  int count, sources;
+  struct {
+    double *block;
+    int lanes, copy_lanes; /* sets of lanes in the block and in the copy */
+  } source[BLOCK];
+} gathered_group;
 
 static joint_group empty_group(void)
 {
@@ -143,12 +183,12 @@ static joint_group empty_group(void)
   return g;
 }
 
-/* Add entry k of the list to lane l of a group */
-static void add_entry(const jlaw_batch *b, joint_group *g, int l, long k)
+/* Add entry k of the list to a group, in the lane of its joint */
+static void add_entry(const jlaw_batch *b, joint_group *g, long k)
 {
-  g->joint[l] = b->index[k];
+  const int l = (int) (b->index[k] % BLOCK);
   g->row[l] = b->order ? (long) b->order[k] : k;
-  g->count++;
+  g->lanes |= 1 << l;
 }
 
 /* Advance a group in its own block. next_offset: distance to the block that is advanced next. copy:
@@ -157,43 +197,45 @@ static void advance_in_place(const jlaw_batch *b, const joint_group *g, double *
                              size_t next_offset, double *copy)
 {
   const size_t rows = (size_t) b->rows;
+  const int others = ALL_LANES & ~g->lanes;
   if (!b->commit) {
     advance_block(b, (double *) memcpy(copy, block, rows * BLOCK * sizeof *copy), 0, g->row);
     return;
   }
-  double *saved = copy;
-  for (int l = 0; l < BLOCK; l++)
-    for (size_t r = 0; g->row[l] == NOT_LISTED && r < rows; r++)
-      *saved++ = block[r * BLOCK + (size_t) l];
+  if (others) copy_lanes(block, others, copy, others, rows);
   advance_block(b, block, next_offset, g->row);
-  saved = copy;
-  for (int l = 0; l < BLOCK; l++)
-    for (size_t r = 0; g->row[l] == NOT_LISTED && r < rows; r++)
-      block[r * BLOCK + (size_t) l] = *saved++;
+  if (others) copy_lanes(copy, others, block, others, rows);
 }
 
 /* Advance gathered joints in `copy`, return them to their blocks, and empty the group */
-static void advance_gathered(const jlaw_batch *b, joint_group *gathered, double *copy)
+static void advance_gathered(const jlaw_batch *b, gathered_group *g, double *copy)
 {
-  advance_block(b, copy, 0, gathered->row);
-  for (int l = 0; b->commit && l < gathered->count; l++) {
-    double *to = state_of(b, gathered->joint[l]);
-    for (size_t r = 0; r < (size_t) b->rows; r++) to[r * BLOCK] = copy[r * BLOCK + (size_t) l];
-  }
-  *gathered = empty_group();
+  advance_block(b, copy, 0, g->group.row);
+  for (int i = 0; b->commit && i < g->sources; i++)
+    copy_lanes(copy, g->source[i].copy_lanes, g->source[i].block, g->source[i].lanes,
+               (size_t) b->rows);
+  g->group = empty_group();
+  g->count = g->sources = 0;
 }
 
-/* Add the joints of a group to the joints that were gathered from other blocks into `copy` */
-static void gather(const jlaw_batch *b, const joint_group *g, joint_group *gathered, double *copy)
+/* Add the joints of a group in `block` to the joints that were gathered into `copy` */
+static void gather(const jlaw_batch *b, const joint_group *group, double *block, gathered_group *g,
+                   double *copy)
 {
-  for (int l = 0; l < BLOCK; l++) {
-    if (g->row[l] == NOT_LISTED) continue;
-    if (gathered->count == BLOCK) advance_gathered(b, gathered, copy);
-    const int to = gathered->count++;
-    gathered->joint[to] = g->joint[l];
-    gathered->row[to] = g->row[l];
-    const double *from = state_of(b, g->joint[l]);
-    for (size_t r = 0; r < (size_t) b->rows; r++) copy[r * BLOCK + (size_t) to] = from[r * BLOCK];
+  for (int remaining = group->lanes; remaining;) {
+    if (g->count == BLOCK) advance_gathered(b, g, copy);
+    int taken = 0, copy_set = 0;
+    for (int l = 0; l < BLOCK && g->count < BLOCK; l++) {
+      if (!(remaining >> l & 1)) continue;
+      g->group.row[g->count] = group->row[l];
+      taken |= 1 << l;
+      copy_set |= 1 << g->count++;
+    }
+    copy_lanes(block, taken, copy, copy_set, (size_t) b->rows);
+    g->source[g->sources].block = block;
+    g->source[g->sources].lanes = taken;
+    g->source[g->sources++].copy_lanes = copy_set;
+    remaining &= ~taken;
   }
 }
 
@@ -222,20 +264,20 @@ static int advance_listed(const jlaw_batch *b, long first, long last)
   const long long *index = b->index;
   double *copy = (double *) calloc(2 * size, sizeof *copy);
   if (!copy) return -1;
-  joint_group gathered = empty_group();
+  gathered_group gathered = {empty_group(), 0, 0, {{NULL, 0, 0}}};
   while (first > 0 && first < last && index[first] / BLOCK == index[first - 1] / BLOCK) first++;
   for (long start = first; start < last;) {
     const long long block = index[start] / BLOCK;
     joint_group group = empty_group();
-    for (; start < b->n && index[start] / BLOCK == block; start++)
-      add_entry(b, &group, (int) (index[start] % BLOCK), start);
+    for (; start < b->n && index[start] / BLOCK == block; start++) add_entry(b, &group, start);
     prefetch_rows(b, start);
-    if (group.count == BLOCK || group.count > MAX_GATHERED_OF_BLOCK) {
+    double *state = state_of(b, block * BLOCK);
+    if (group.lanes == ALL_LANES || count_lanes(group.lanes) > MAX_GATHERED_OF_BLOCK) {
       const long long next = start < last ? index[start] / BLOCK - block : 0;
-      advance_in_place(b, &group, state_of(b, block * BLOCK), (size_t) next * size, copy);
+      advance_in_place(b, &group, state, (size_t) next * size, copy);
     } else {
       if (start < last) prefetch_block(b, state_of(b, index[start] / BLOCK * BLOCK));
-      gather(b, &group, &gathered, copy + size);
+      gather(b, &group, state, &gathered, copy + size);
     }
   }
   advance_gathered(b, &gathered, copy + size);

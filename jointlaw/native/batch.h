@@ -22,6 +22,14 @@ enum { /* measures of a joint after a step: fractions, J/m2, damage; its displac
        JLAW_MEASURES
 };
 
+enum { /* verdicts of jlaw_check_list; library.py has the same numbers */
+       JLAW_INCREASING = 1,
+       JLAW_ANY_ORDER = 0,
+       JLAW_OUTSIDE = -1,
+       JLAW_REPEATED = -2,
+       JLAW_NO_MEMORY = -3
+};
+
 typedef struct {
   const jlaw_law *law;
   double *state;          /* (blocks, rows, JLAW_JOINTS_PER_BLOCK), or (n, rows) if contiguous */

@@ -6,6 +6,7 @@
 #include "elements.h"
 #include "law.h"
 #include "export.h"
+#include <stdlib.h>
 
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 
@@ -47,19 +48,45 @@ OUT int jlaw_run(jlaw_batch *b, int operation)
 /* Rows of a state, which Python compares with its own number */
 OUT int jlaw_state_rows(const jlaw_law *law) { return jl_state_rows(law); }
 
-/* Sort joints (n,) by their blocks. Each block starts at the number of joints in the blocks before
- * it, which counts (blocks + 1,), zeros before the call, accumulates. Writes the sorted joints into
- * index (n,) and their places in the list into order (n,). */
-OUT void jlaw_sort_by_block(const long long *joints, long long n, long long *counts,
-                            long long blocks, long long *index, long long *order)
+/* Check a list of joints (n,) of a batch of `count`. Returns JLAW_INCREASING or JLAW_ANY_ORDER for a
+ * valid list, JLAW_OUTSIDE if a joint is not in the batch, JLAW_REPEATED if one is named twice, and
+ * JLAW_NO_MEMORY. */
+OUT int jlaw_check_list(const long long *joints, long long n, long long count)
 {
-  for (long long k = 0; k < n; k++) counts[joints[k] / JLAW_JOINTS_PER_BLOCK + 1]++;
-  for (long long i = 0; i < blocks; i++) counts[i + 1] += counts[i];
+  long long sorted = 0; /* joints that increase, from the first one on */
+  while (sorted < n && joints[sorted] >= 0 && joints[sorted] < count
+         && (sorted == 0 || joints[sorted] > joints[sorted - 1]))
+    sorted++;
+  if (sorted == n) return JLAW_INCREASING;
+  for (long long k = sorted; k < n; k++)
+    if (joints[k] < 0 || joints[k] >= count) return JLAW_OUTSIDE;
+  unsigned char *named = (unsigned char *) calloc((size_t) (count / 8 + 1), 1); /* a bit a joint */
+  if (!named) return JLAW_NO_MEMORY;
+  int verdict = JLAW_ANY_ORDER;
   for (long long k = 0; k < n; k++) {
-    const long long place = counts[joints[k] / JLAW_JOINTS_PER_BLOCK]++;
-    index[place] = joints[k];
-    order[place] = k;
+    const int bit = 1 << (joints[k] & 7);
+    if (named[joints[k] >> 3] & bit) verdict = JLAW_REPEATED;
+    named[joints[k] >> 3] = (unsigned char) (named[joints[k] >> 3] | bit);
   }
+  free(named);
+  return verdict;
+}
+
+/* Sort joints (n,) by their blocks: writes the sorted joints and their places in the list into
+ * sorted (2, n). blocks: number of blocks of the batch. Returns 0, or JLAW_NO_MEMORY. */
+OUT int jlaw_sort_by_block(const long long *joints, long long n, long long blocks, long long *sorted)
+{
+  long long *place = (long long *) calloc((size_t) blocks + 1, sizeof *place); /* of each block */
+  if (!place) return JLAW_NO_MEMORY;
+  for (long long k = 0; k < n; k++) place[joints[k] / JLAW_JOINTS_PER_BLOCK + 1]++;
+  for (long long i = 0; i < blocks; i++) place[i + 1] += place[i];
+  for (long long k = 0; k < n; k++) {
+    const long long at = place[joints[k] / JLAW_JOINTS_PER_BLOCK]++;
+    sorted[at] = joints[k];
+    sorted[n + at] = k;
+  }
+  free(place);
+  return 0;
 }
 
 /* Hash of the sources that this library was built from */

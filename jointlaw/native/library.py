@@ -84,8 +84,8 @@ def load_file(path: Path) -> ctypes.CDLL:
         )
     pointer = ctypes.c_void_p
     count = ctypes.c_longlong
-    library.jlaw_sort_by_block.argtypes = [pointer, count, pointer, count, pointer, pointer]
-    library.jlaw_sort_by_block.restype = None
+    library.jlaw_sort_by_block.argtypes = [pointer, count, count, pointer]
+    library.jlaw_check_list.argtypes = [pointer, count, count]
     return library
 
 

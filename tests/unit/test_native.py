@@ -459,3 +459,22 @@ def test_a_list_that_names_a_joint_twice_is_refused(law, joints):
     with pytest.raises(ValueError, match="where names a joint twice"):
         batch.update(np.full((len(joints), law.dim), 1e-8), where=joints)
     assert not batch.snapshot().values.any()
+
+
+@pytest.mark.parametrize(
+    ("joints", "message"),
+    [([5, 4, 3, 4], "where names a joint twice"), ([3, 1, 999], "where names joint 999"),
+     ([0, -1], "where names joint -1")],
+)  # fmt: skip
+@pytest.mark.parametrize("kernel", ["numpy", "native"])
+def test_a_prepared_step_with_a_wrong_list_is_refused(monkeypatch, law, kernel, joints, message):
+    """Also where the list was valid in another batch."""
+    monkeypatch.setenv("JOINTLAW_KERNEL", kernel)
+    d = np.full((len(joints), law.dim), 1e-8)
+    step = engine.Step(d, np.empty_like(d), None, np.array(joints))
+    batch = law.joints(N)
+    if joints[-1] == 999:
+        law.joints(1000).advance(step)
+    with pytest.raises(ValueError, match=message):
+        batch.advance(step)
+    assert not batch.snapshot().values.any()

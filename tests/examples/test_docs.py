@@ -48,7 +48,8 @@ def commands(page):
     return [line.replace(".venv/bin/", "") for line in lines]
 
 
-ELSEWHERE = {"docs/particles.md"}  # runs in YADE's own Python: tests/hosts/test_yade_table.py
+# runs in YADE's own Python: tests/hosts/test_yade_table.py; tutorials: test_tutorials.py
+ELSEWHERE = {"docs/particles.md", *(page for page in PAGES if "/tutorial-" in page)}
 CHECKS = {  # of the variables of the examples of a page
     # a point of the data
     "docs/fits.md": lambda names: names["fit"].predict(100e-6) == pytest.approx(6.4e6, rel=0.02),

@@ -32,6 +32,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
     "sphinx.ext.mathjax",
+    "sphinx_copybutton",
     "blocks_view",
     "browser",
     "claims",
@@ -43,6 +44,7 @@ extensions = [
 exclude_patterns = ["_build", "gallery", "paper", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
+    "toc.empty_glob",
 ]
 nitpicky = True  # a reference that leads nowhere is an error
 nitpick_ignore_regex = [(r"py:.*", r".*")]  # types of numpy and Python live on other sites
@@ -50,7 +52,15 @@ nitpick_ignore_regex = [(r"py:.*", r".*")]  # types of numpy and Python live on 
 myst_enable_extensions = ["dollarmath", "amsmath", "html_image"]
 myst_heading_anchors = 3
 
+myst_html_meta = {
+    "description": "jointlaw: a constitutive law for rough rock joints in discrete-element, block "
+    "and finite-element codes",
+}
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+
 html_theme = "furo"
+html_favicon = "_static/favicon.svg"
 html_title = f"jointlaw {release}"
 html_static_path = ["_static", str(MATHJAX)]
 html_css_files = ["site.css"]

@@ -1,7 +1,10 @@
-"""Differences between a page on GitHub and on the site: links, and the first page."""
+"""Differences between a page on GitHub and on the site: links, the first page, thumbnails."""
 
+import ast
 import re
 from pathlib import Path
+
+from docutils import nodes
 
 ROOT = Path(__file__).parents[2]
 CITED = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
@@ -9,6 +12,8 @@ REPOSITORY = re.search(r'^repository-code: "(.+)"', CITED, re.MULTILINE)[1]
 README = ROOT / "README.md"
 SHARED = "<!-- end of the first page of the site -->"
 PLACE = "<!-- the first part of README.md -->"
+DOORS = re.compile(r"<!-- doors -->\n(.*)<!-- end of doors -->\n", re.DOTALL)
+OPENING = "\n```python\n"  # what begins after the opening of README.md: its first script
 
 
 def first_part():
@@ -18,6 +23,18 @@ def first_part():
         raise ValueError(f"{README}: the line {SHARED} is missing; index.md includes what is above")
     inside = re.sub(r"\]\((?!docs/|\w+:|#)([^)\s]+)\)", r"](../\1)", shared)
     return inside.replace("](docs/", "](").replace('src="docs/', 'src="')
+
+
+def first_page(index):
+    """The page index.md with the first part of README.md, and its doors after the opening.
+
+    The doors, links for three readers and a joint to drag, take the place of the picture of README.
+    """
+    doors = DOORS.search(index)[1]
+    opening, mark, rest = first_part().partition(OPENING)
+    without_picture = re.sub(r"!\[[^\]]*\]\([^)]*\)\n", "", opening)
+    page = f"{without_picture}\n{doors}\n## A first script\n{mark}{rest}"
+    return DOORS.sub("", index).replace(PLACE, page)
 
 
 def links(text):
@@ -39,10 +56,21 @@ def read(app, name, source):
     """Put the first part of README.md into index.md and adapt the links of every page."""
     if name == "index":
         app.env.note_dependency(README)
-        source[0] = source[0].replace(PLACE, first_part())
+        source[0] = first_page(source[0])
     source[0] = links(source[0])
+
+
+def describe_thumbnails(app, doctree):
+    """Give thumbnails of the gallery, which have no alternative text, the title of their page."""
+    for image in doctree.findall(nodes.image):
+        script = re.search(r"sphx_glr_(plot_\w+)_thumb", image["uri"])
+        if script and not image.get("alt"):
+            (path,) = ROOT.glob(f"docs/*/{script[1]}.py")
+            text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+            image["alt"] = f"Thumbnail: {text.splitlines()[0].strip('= ')}"
 
 
 def setup(app):
     app.connect("source-read", read)
+    app.connect("doctree-read", describe_thumbnails)
     return {"parallel_read_safe": True}

@@ -64,7 +64,7 @@ def discard_output() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status (docs/api.md)."""
+    """Run one command; returns the exit status (docs/commands.md)."""
     words = sys.argv[1:] if arguments is None else arguments
     name = " ".join(["jointlaw", *words[:1]])
     try:

@@ -82,12 +82,18 @@ def test_jointlaw_never_imports_the_demo():
     assert not [name for path in ours for name in names(path) if name.startswith("dem_demo")]
 
 
+def api_pages():
+    """Text of all pages of the reference of functions."""
+    pages = sorted((ROOT / "docs").glob("api*.md"))
+    return "\n".join(page.read_text(encoding="utf-8") for page in pages)
+
+
 def public_names():
-    """Full names on docs/api.md; "MODULE.*" where it documents all members of a module."""
+    """Full names on docs/api*.md; "MODULE.*" where a page documents all members of a module."""
     public = set()
     current_module = ""
     module = ""
-    for line in (ROOT / "docs/api.md").read_text(encoding="utf-8").splitlines():
+    for line in api_pages().splitlines():
         if match := re.match(r"\.\. currentmodule:: (\S+)", line):
             current_module = f"{match[1]}."
         elif match := re.match(r"\.\. auto(\w+):: (\S+)", line):
@@ -108,7 +114,7 @@ def test_every_public_name_loads_and_is_on_the_api_page():
 
 
 def test_the_example_host_imports_public_names_only():
-    """All names that dem_demo imports from jointlaw are on docs/api.md, for hosts of others."""
+    """All names that dem_demo imports from jointlaw are on docs/api*.md, for hosts of others."""
     public = public_names()
     demo = [path for path in trees() if path.startswith("dem_demo/")]
     imports = {(path, name) for path in demo for name in names(path, types=True)}
@@ -118,7 +124,9 @@ def test_the_example_host_imports_public_names_only():
         for path, name in imports
         if name.startswith("jointlaw.") and not {name, f"{name.rpartition('.')[0]}.*"} & public
     }
-    assert not private, f"document them on docs/api.md, or do not use them: {sorted(private)}"
+    assert not private, (
+        f"document them on docs/api-support.md, or do not use them: {sorted(private)}"
+    )
     assert ("dem_demo/cli.py", "jointlaw.PathError") in imports
 
 
@@ -135,13 +143,12 @@ def test_packages_import_without_docstrings():
     subprocess.run([sys.executable, "-OO", "-c", code], check=True)
 
 
-def test_the_api_page_names_each_module_once_and_existing_members_only():
+def test_the_api_pages_name_each_module_once_and_existing_members_only():
     """The site is built with warnings as errors; this sees the same without building it."""
-    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"\.\. automodule:: (\S+)\n(?:   :members: (.*)\n)?", page)
+    blocks = re.findall(r"\.\. automodule:: (\S+)\n(?:   :members: (.*)\n)?", api_pages())
     modules = [module for module, _ in blocks]
     assert len(set(modules)) == len(modules)
     for module, members in blocks:
         loaded = pkgutil.resolve_name(module)
         for member in filter(None, re.split(r",\s*", members)):
-            assert hasattr(loaded, member), f"docs/api.md: {module} has no {member}"
+            assert hasattr(loaded, member), f"docs/api*.md: {module} has no {member}"

@@ -6,6 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lammps_host import HEAD, LAWS, dumped, run, thermo
+from lattice import lattice_contacts
+
+import jointlaw as jl
 
 PAGE = Path(__file__).parents[2] / "docs" / "particles.md"
 R = 0.01
@@ -97,6 +100,29 @@ variable apart equal x[2]-x[1]
 thermo_style custom step c_stress[1] c_stress[2] v_force v_apart
 thermo_modify format float %.15g
 """
+
+
+def test_the_time_step_is_that_of_python(plugin):
+    """64 spheres, each with six joints: never longer than `jl.stable_time_step`.
+
+    A little shorter: the plug-in takes the Frobenius norm of the tangent where it is larger.
+    """
+    law = LAWS["rock"]
+    spacing = 0.01999
+    first, second = lattice_contacts(4)
+    arm = np.full((len(first), 2), 0.5 * spacing)
+    dt = jl.stable_time_step(
+        first,
+        second,
+        np.full(64, MASS),
+        AREA,
+        law.max_stiffness(2 * R - spacing),
+        np.full(64, 0.4 * MASS * R * R),
+        arm,
+    )
+    table = thermo(run(plugin, heap("run 0\n", heat=1e-30)))[0]
+    assert table["c_joint[1]"][-1] == len(first)
+    assert 0.93 * dt < table["c_joint[6]"][-1] <= dt
 
 
 def test_damping_of_now_and_the_virial(plugin):

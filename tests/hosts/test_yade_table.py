@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lattice import lattice_contacts
 from yade_host import make_table, run_scene, run_yade
 
 import jointlaw as jl
@@ -209,6 +210,13 @@ def test_time_step_knows_the_area_however_it_is_given(scenes):
         assert out[name][0] == pytest.approx(expected, rel=1e-12), name
     assert out["circle"][0] == pytest.approx(expected * np.sqrt(10.0 / AREA), rel=1e-12)
     assert "call time_step() after the first step" in out["function"][1]
+    # six joints at every sphere: the step of a lattice by Python's function
+    first, second = lattice_contacts(4)
+    mass = np.full(64, out["m"])
+    R = 0.5
+    arm = np.full((len(first), 2), R)
+    dt = jl.stable_time_step(first, second, mass, 10.0, out["k"], 0.4 * mass * R**2, arm)
+    assert expected == pytest.approx(0.25 * dt, rel=1e-3)
 
 
 def test_a_checkpoint_of_version_2_is_read(scenes):

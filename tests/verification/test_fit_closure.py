@@ -3,6 +3,7 @@ that one curve does not determine, yielding, compliance of rock and machine. A l
 against Barton's relations."""
 
 import pickle
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -329,3 +330,11 @@ def test_command_prints_its_assumptions(tmp_path, capsys):
     assert "largest dilation angle 16.6 deg (10.0)" in printed
     assert "Assumed (not constrained by field values)" in printed
     assert jl.JointLaw.from_toml(tmp_path / "law.toml").asperity.mu == pytest.approx(3**-0.5)
+    out = tmp_path / "by-stress"
+    assert main(f"field {values} --degradation stress --out {out}".split()) == 0
+    assert "a contact stress of JCS/4" in capsys.readouterr().out
+    law = jl.JointLaw.from_toml(out / "law.toml")
+    assert (law.degradation_stress, law.slope_wear) == (25e6, np.inf)
+    origin = tomllib.loads((out / "law.toml").read_text())["about"]["origin"]
+    assert "degradation_stress" in origin
+    assert "slope_wear" not in origin

@@ -314,12 +314,16 @@ def state_faults():
     rows = {name for law in kinds.LAWS.values() for name in law.tables.row_counts}
     for name in sorted(rows):
         line = f"""
-        values = state.values.copy()
         if {name!r} in self.law.tables.row_counts:
             first = self.law.tables.first_rows[{name!r}]
-            values[:, first : first + self.law.tables.row_counts[{name!r}]] = 0.0"""
+            dropped = state.values.copy()
+            dropped[:, first : first + self.law.tables.row_counts[{name!r}]] = 0.0
+            state = JointState(state.fingerprint, dropped)"""
         yield source.insertion(
-            "state", "\n        values = state.values\n", line, f"rows {name} are not restored"
+            "state",
+            "require_admissible_states(self.law.tables, state.values)\n",
+            line,
+            f"rows {name} are not restored",
         )
 
 

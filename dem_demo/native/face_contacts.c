@@ -40,6 +40,11 @@ static double dot(const double *a, const double *b)
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+static double dot_2(const double *a, const double *b)
+{
+  return a[0] * b[0] + a[1] * b[1];
+}
+
 static void cross(const double *a, const double *b, double *out)
 {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -240,24 +245,23 @@ static double triangle_area(const double *a, const double *b, const double *c)
   return 0.5 * fabs((a[0] - c[0]) * (b[1] - c[1]) - (a[1] - c[1]) * (b[0] - c[0]));
 }
 
-/* Projection of face f along the normal of face g in coordinates of the plane of g: corners counter-
- * clockwise seen along this normal if `reverse`. Returns the height of the lowest corner. */
-static double project(const dem_solids *s, long long f, int reverse, const double *origin,
-                      const double *first, const double *second, const double *normal,
-                      double (*polygon)[2])
+/* Mean place along a direction of the corners of a polygon that lie within about a length from the
+ * farthest one; of the nearest one if the length is negative. Unlike the largest place it is smooth where
+ * an edge becomes normal to the direction. */
+static double extreme(double (*polygon)[2], int m, const double *direction, double length)
 {
-  const long long *ring = s->corner + s->first_corner[f];
-  const int m = (int) (s->first_corner[f + 1] - s->first_corner[f]);
-  double lowest = HUGE_VAL;
+  double farthest = -HUGE_VAL, sum = 0.0, weights = 0.0;
   for (int i = 0; i < m; i++) {
-    double at[3];
-    subtract(s->vertex + 3 * ring[reverse ? m - 1 - i : i], origin, at);
-    polygon[i][0] = dot(at, first);
-    polygon[i][1] = dot(at, second);
-    const double height = dot(at, normal);
-    if (height < lowest) lowest = height;
+    const double along = dot_2(direction, polygon[i]) / length;
+    if (along > farthest) farthest = along;
   }
-  return lowest;
+  for (int i = 0; i < m; i++) {
+    const double along = dot_2(direction, polygon[i]) / length;
+    const double weight = exp(along - farthest);
+    sum += weight * along;
+    weights += weight;
+  }
+  return length * sum / weights;
 }
 
 /* Keep the strip of a polygon next to its lowest corner. gradient (2,): slope of the height along both
@@ -272,12 +276,8 @@ static int keep_strip(double (*polygon)[2], int m, const double *gradient, doubl
   *weight = 1.0;
   if (!(part > 0.0)) return m;
   const double up[2] = {gradient[0] / slope, gradient[1] / slope};
-  double lowest = HUGE_VAL, highest = -HUGE_VAL;
-  for (int i = 0; i < m; i++) {
-    const double along = up[0] * polygon[i][0] + up[1] * polygon[i][1];
-    if (along < lowest) lowest = along;
-    if (along > highest) highest = along;
-  }
+  const double lowest = extreme(polygon, m, up, -0.25 * width);
+  const double highest = extreme(polygon, m, up, 0.25 * width);
   *weight = 1.0 + part;
   if (!(highest - lowest > width)) return m;
   const double reach = lowest + pow(highest - lowest, 1.0 - part) * pow(width, part);
@@ -318,6 +318,92 @@ static double share_inside(double (*polygon)[2], int m, double (*edges)[2], int 
   return farthest < fade ? farthest / fade : 1.0;
 }
 
+/* A face over the plane of another one, along two axes of this plane and its normal */
+typedef struct {
+  double corner[MAX_CORNERS][3]; /* counter-clockwise seen along the normal of the plane */
+  double normal[3];              /* of the face */
+  int m;
+} raised_face;
+
+/* The overlap of two faces */
+typedef struct {
+  double polygon[MAX_CORNERS][2], area[MAX_CORNERS]; /* corners, and the areas that they carry */
+  double height, gradient[2];                        /* of the face over the plane */
+  double lowest;                                     /* height over the plane */
+  int m;
+} overlap;
+
+/* The overlap of a face with the face whose plane it lies over, whose corners are `edges` */
+static void find_overlap(const raised_face *face, double (*edges)[2], int m_edges, double tie,
+                         double strip, double fade, overlap *out)
+{
+  double (*polygon)[2] = out->polygon, centroid[2], weight = 1.0, share = 1.0;
+  const double *normal = face->normal;
+  int m = face->m;
+  for (int i = 0; i < m; i++) memcpy(polygon[i], face->corner[i], sizeof polygon[0]);
+  for (int i = 0; i < m_edges && m > 2; i++)
+    m = clip(polygon, m, edges[i], edges[(i + 1) % m_edges]);
+  m = without_ties(polygon, m, tie);
+  out->m = 0;
+  out->lowest = HUGE_VAL;
+  if (m < 3) return;
+  const double *gradient = out->gradient, sine = hypot(normal[0], normal[1]);
+  out->gradient[0] = -normal[0] / normal[2];
+  out->gradient[1] = -normal[1] / normal[2];
+  out->height = dot(normal, face->corner[0]) / normal[2];
+  for (int i = 0; i < m; i++) {
+    const double here = out->height + gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
+    if (here < out->lowest) out->lowest = here;
+  }
+  if (sine > DEM_FLUSH_SINE) {
+    share = share_inside(polygon, m, edges, m_edges, gradient, tie, fade);
+    m = keep_strip(polygon, m, gradient, sine, strip, &weight);
+    m = without_ties(polygon, m, tie);
+  }
+  if (m < 3 || !(share * polygon_area(polygon, m, centroid) > tie * tie)) return;
+  for (int i = 0; i < m; i++)
+    out->area[i] = 0.5 * share * weight *
+                   (triangle_area(polygon[(i + m - 1) % m], polygon[i], centroid) +
+                    triangle_area(polygon[i], polygon[(i + 1) % m], centroid));
+  out->m = m;
+}
+
+/* Move a face by a small motion: along an axis (0 to 2), or about it (3 to 5) through the origin */
+static void move_face(raised_face *face, int motion, double step)
+{
+  const int axis = motion % 3, next = (axis + 1) % 3, last = (axis + 2) % 3;
+  const double cosine = cos(step), sine = sin(step);
+  for (int i = -1; i < face->m; i++) {
+    double *at = i < 0 ? face->normal : face->corner[i];
+    if (motion < 3) {
+      if (i >= 0) at[axis] += step;
+      continue;
+    }
+    const double u = at[next], v = at[last];
+    at[next] = cosine * u - sine * v;
+    at[last] = sine * u + cosine * v;
+  }
+}
+
+/* Derivatives (m, 6) of the areas of an overlap by displacements of the face along three axes, and by
+ * rotations about them through the origin: by differences, zero where the number of corners changes */
+static void find_area_rates(const raised_face *face, double (*edges)[2], int m_edges, double tie,
+                            double strip, double fade, int m, double (*rate)[6])
+{
+  for (int motion = 0; motion < 6; motion++) {
+    const double step = DEM_DIFFERENCE * (motion < 3 ? strip : 1.0);
+    overlap moved[2];
+    for (int side = 0; side < 2; side++) {
+      raised_face copy = *face;
+      move_face(&copy, motion, side ? step : -step);
+      find_overlap(&copy, edges, m_edges, tie, strip, fade, moved + side);
+    }
+    const int is_same = moved[0].m == m && moved[1].m == m;
+    for (int i = 0; i < m; i++)
+      rate[i][motion] = is_same ? (moved[1].area[i] - moved[0].area[i]) / (2.0 * step) : 0.0;
+  }
+}
+
 /* Write point `i`, if there is room for it. face_a, face_b: faces of the blocks; normal: outward of the
  * block whose plane it is; base: a point of this plane */
 static void write_point(const dem_points *out, long long i, long long face_a, long long face_b,
@@ -333,6 +419,7 @@ static void write_point(const dem_points *out, long long i, long long face_a, lo
     out->point[3 * i + j] = point[j];
     out->normal[3 * i + j] = normal[j];
     out->base[3 * i + j] = base[j];
+    out->area_rate[6 * i + j] = out->area_rate[6 * i + 3 + j] = 0.0;
   }
 }
 
@@ -343,55 +430,55 @@ static long long touch(const dem_solids *s, long long f, long long g, int f_is_o
                        double max_depth, double tie, double strip, long long count,
                        const dem_points *out)
 {
-  const double *normal = s->normal + 3 * g, *face_normal = s->normal + 3 * f;
-  const long long *ring = s->corner + s->first_corner[g];
+  const double *normal = s->normal + 3 * g;
+  const long long *ring = s->corner + s->first_corner[g], *ring_f = s->corner + s->first_corner[f];
   const double *origin = s->vertex + 3 * ring[0];
   const int m_f = (int) (s->first_corner[f + 1] - s->first_corner[f]);
   const int m_g = (int) (s->first_corner[g + 1] - s->first_corner[g]);
-  double first[3], second[3], polygon[MAX_CORNERS][2], edges[MAX_CORNERS][2];
   if (m_f + m_g > MAX_CORNERS - 1) return TOO_MANY_CORNERS;
-  subtract(s->vertex + 3 * ring[1], origin, first);
-  const double length = sqrt(dot(first, first));
-  for (int j = 0; j < 3; j++) first[j] /= length;
-  cross(normal, first, second);
-  if (!(project(s, f, 1, origin, first, second, normal, polygon) < max_gap)) return 0;
-  project(s, g, 0, origin, first, second, normal, edges);
-  int m = m_f;
-  for (int i = 0; i < m_g && m > 2; i++) m = clip(polygon, m, edges[i], edges[(i + 1) % m_g]);
-  m = without_ties(polygon, m, tie);
-  if (m < 3) return 0;
-  double start[3], product[3], weight;
-  subtract(s->vertex + 3 * s->corner[s->first_corner[f]], origin, start);
-  cross(face_normal, normal, product);
-  const double cosine = dot(face_normal, normal), sine = sqrt(dot(product, product));
-  const double gradient[2] = {-dot(face_normal, first) / cosine, -dot(face_normal, second) / cosine};
-  const double height = dot(face_normal, start) / cosine; /* of the plane of f at the origin */
-  double lowest = HUGE_VAL;
-  for (int i = 0; i < m; i++) {
-    const double here = height + gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
-    if (here < lowest) lowest = here;
+  double axis[3][3], edges[MAX_CORNERS][2], lowest = HUGE_VAL;
+  raised_face face;
+  face.m = m_f;
+  subtract(s->vertex + 3 * ring[1], origin, axis[0]);
+  const double length = sqrt(dot(axis[0], axis[0]));
+  for (int j = 0; j < 3; j++) axis[0][j] /= length;
+  cross(normal, axis[0], axis[1]);
+  memcpy(axis[2], normal, sizeof axis[2]);
+  for (int i = 0; i < m_f; i++) {
+    double at[3];
+    subtract(s->vertex + 3 * ring_f[m_f - 1 - i], origin, at);
+    for (int k = 0; k < 3; k++) face.corner[i][k] = dot(at, axis[k]);
+    if (face.corner[i][2] < lowest) lowest = face.corner[i][2];
   }
-  if (!(lowest < max_gap && lowest > -max_depth)) return 0;
-  const double share =
-      sine > DEM_FLUSH_SINE
-          ? share_inside(polygon, m, edges, m_g, gradient, tie, DEM_FADE_PER_GAP * max_gap)
-          : 1.0;
-  m = keep_strip(polygon, m, gradient, sine, strip, &weight);
-  m = without_ties(polygon, m, tie);
-  double centroid[2];
-  if (m < 3 || !(share * polygon_area(polygon, m, centroid) > tie * tie)) return 0;
-  for (int i = 0; i < m; i++) {
-    const double *here = polygon[i];
-    const double up = height + gradient[0] * here[0] + gradient[1] * here[1];
-    const double area = 0.5 * (triangle_area(polygon[(i + m - 1) % m], here, centroid) +
-                               triangle_area(here, polygon[(i + 1) % m], centroid));
+  if (!(lowest < max_gap)) return 0;
+  for (int k = 0; k < 3; k++) face.normal[k] = dot(s->normal + 3 * f, axis[k]);
+  for (int i = 0; i < m_g; i++) {
+    double at[3];
+    subtract(s->vertex + 3 * ring[i], origin, at);
+    for (int k = 0; k < 2; k++) edges[i][k] = dot(at, axis[k]);
+  }
+  const double fade = DEM_FADE_PER_GAP * max_gap;
+  overlap found;
+  find_overlap(&face, edges, m_g, tie, strip, fade, &found);
+  if (!(found.lowest < max_gap && found.lowest > -max_depth)) return 0;
+  for (int i = 0; i < found.m; i++) {
+    const double *here = found.polygon[i];
+    const double up = found.height + found.gradient[0] * here[0] + found.gradient[1] * here[1];
     double point[3];
     for (int j = 0; j < 3; j++)
-      point[j] = origin[j] + here[0] * first[j] + here[1] * second[j] + up * normal[j];
+      point[j] = origin[j] + here[0] * axis[0][j] + here[1] * axis[1][j] + up * normal[j];
     write_point(out, count + i, f_is_of_a ? f : g, f_is_of_a ? g : f, !f_is_of_a, point, normal,
-                origin, share * weight * area);
+                origin, found.area[i]);
   }
-  return m;
+  if (found.m > 0 && hypot(face.normal[0], face.normal[1]) > DEM_FLUSH_SINE) {
+    double rate[MAX_CORNERS][6];
+    find_area_rates(&face, edges, m_g, tie, strip, fade, found.m, rate);
+    for (int i = 0; i < found.m && count + i < out->capacity; i++)
+      for (int j = 0; j < 6; j++)
+        for (int k = 0; k < 3; k++)
+          out->area_rate[6 * (count + i) + j] += rate[i][3 * (j / 3) + k] * axis[k][j % 3];
+  }
+  return found.m;
 }
 
 /* Face of block i with vertex v, or with vertices v and w, that looks most along a direction */

@@ -5,8 +5,11 @@
  * point moves where shears grow. The plane is of block b, or of a where a block stands on its edge
  * (face_contacts.c). The closure is the depth of the point below the plane, so with the shears at the point it has exact rates by the motions of both blocks, and
  * the work of the tractions on the blocks is the work that the joint takes up. The polygons of the
- * overlaps, and with them points and areas, change where contacts are searched again.
+ * overlaps, and with them the points, change where contacts are searched again; until then the areas of
+ * contacts along edges follow their derivatives.
  */
+#include <math.h>
+
 #include "export.h"
 #include "layout.h"
 
@@ -73,6 +76,13 @@ EXPORT long long dem_update_face_points(dem_face_points *points)
       arm[j] += points->motion[j * n + own] - points->motion[j * n + other];
     to_block(other_axes, arm, other_arm);
     for (int c = 0; c < 3; c++) to_space(other_axes, local_frame + 3 * c, frame[c]);
+    const double *found_at = points->found_at + 12 * i, *gradient = points->area_gradient + 12 * i;
+    double area = points->found_area[i];
+    for (int j = 0; j < 6; j++) {
+      area += gradient[j] * (points->motion[j * n + a] - found_at[j]);
+      area += gradient[6 + j] * (points->motion[j * n + b] - found_at[6 + j]);
+    }
+    points->area[i] = fmax(area, DEM_MIN_AREA_SHARE * points->found_area[i]);
     points->closure[i] = points->plane_offset[i] - dot(other_arm, local_frame);
     for (int j = 0; j < 3; j++) frame[0][j] = -frame[0][j]; /* towards the plane is closing */
     for (int c = 0; c < 3; c++)

@@ -35,6 +35,8 @@ CONSTANTS = {
     "FLUSH_SINE": Constant(0.03489949670250097, "sine of 2 degrees: faces that lie on each other"),
     "STRIP_SINE": Constant(0.08715574274765817, "sine of 5 degrees: a block stands on its edge"),
     "FADE_PER_GAP": Constant(0.125, "of the range of contacts: where an edge contact fades"),
+    "MIN_AREA_SHARE": Constant(0.1, "of the area of a point that follows its derivatives"),
+    "DIFFERENCE": Constant(1e-6, "rad, and of the strip: motion in differences of areas"),
     "CROSSING_SINE": Constant(1e-3, "sine between two edges that cross"),
     "CROSSING_ERROR": Constant(1e-9, "of the length of an edge: rounding of a distance of blocks"),
     "RANGE_TOLERANCE": Constant(1e-10, "m by which a corner may leave its range: no chatter"),
@@ -232,6 +234,7 @@ POINTS = {
     "normal": Field("double *", "(capacity, 3): of the plane, out of its block"),
     "base": Field("double *", "(capacity, 3): a point of the plane, m"),
     "area": Field("double *", "(capacity,): m2"),
+    "area_rate": Field("double *", "(capacity, 6): of the area by motions of the point's block"),
 }
 FACE_POINTS = {
     "n_blocks": Field("long long", "n"),
@@ -245,6 +248,10 @@ FACE_POINTS = {
     "local_frame": Field("const double *", "(k, 3, 3): normal, axes of shear, in the other block"),
     "plane_offset": Field("const double *", "(k,): m, of the plane from the centroid of its block"),
     "closure": Field("double *", "(k,): m, depth of the point below the plane"),
+    "found_area": Field("const double *", "(k,): m2, when the point was found"),
+    "found_at": Field("const double *", "(k, 12): motions of a, b then"),
+    "area_gradient": Field("const double *", "(k, 12): of the area by motions of a, b"),
+    "area": Field("double *", "(k,): m2"),
     "kinematics": Field("double *", "(k, 3, 12): of closure and shears by motions of a, b"),
 }
 BOLTS = {

@@ -140,7 +140,10 @@ class ContactPoints(NamedTuple):
     block_a, block_b, face_a, face_b (k,): numbers of blocks and faces, block_a < block_b.
     plane_is_of_a (k,): whether the plane of the contact belongs to block a; else to b. point
     (k, 3) in m: on the other block. normal (k, 3): of the plane, out of its block; base (k, 3): a
-    point of it, in m. area (k,) in m2. contact (k,): number of the contact of two faces.
+    point of it, in m. area (k,) in m2; area_rate (k, 6): its derivatives by displacements of the
+    block of the point against the block of the plane (m), and by rotations about axes x, y, z
+    through `base` (m2); zero for faces that lie on each other. contact (k,): number of the contact
+    of two faces.
     """
 
     block_a: np.ndarray
@@ -152,6 +155,7 @@ class ContactPoints(NamedTuple):
     normal: np.ndarray
     base: np.ndarray
     area: np.ndarray
+    area_rate: np.ndarray
     contact: np.ndarray
 
     @property
@@ -215,10 +219,11 @@ def find_contacts(
         plane_is_of_a = np.empty(room, bool)
         point, normal, base = np.empty((3, room, 3))
         area = np.empty(room)
+        area_rate = np.empty((room, 6))
         out = PointArrays(capacity=room)
         out.bind(
             face_a=face_a, face_b=face_b, plane_is_of_a=plane_is_of_a, point=point, normal=normal,
-            base=base, area=area,
+            base=base, area=area, area_rate=area_rate,
         )  # fmt: skip
         places = map(address, (pairs, max_gap, max_depth, tie, strip))
         count = surfaces.arrays.call("face_contacts", len(pairs), *places, address(out))
@@ -232,7 +237,7 @@ def find_contacts(
     return ContactPoints(
         surfaces.block_of_face[face_a], surfaces.block_of_face[face_b], face_a, face_b,
         plane_is_of_a[:count].copy(), point[:count].copy(), normal[:count].copy(),
-        base[:count].copy(), area[:count].copy(), np.cumsum(starts) - 1,
+        base[:count].copy(), area[:count].copy(), area_rate[:count].copy(), np.cumsum(starts) - 1,
     )  # fmt: skip
 
 
@@ -279,6 +284,22 @@ def contact_axes(surfaces: Surfaces, points: ContactPoints, axis_2: np.ndarray) 
     return np.stack([normal, axis_2, np.cross(normal, axis_2)], axis=1)
 
 
+def area_gradients(surfaces: Surfaces, points: ContactPoints) -> np.ndarray:
+    """Derivatives (k, 12) of areas of contact points by the motions of block a, then of block b."""
+    slope, moment = points.area_rate[:, :3], points.area_rate[:, 3:]
+    parts = []
+    for block, owns_plane in (
+        (points.block_a, points.plane_is_of_a),
+        (points.block_b, ~points.plane_is_of_a),
+    ):
+        arm = points.base - surfaces.position[block]
+        turning = np.cross(arm, slope) + moment
+        turning = np.einsum("ki,kij->kj", turning, surfaces.rotation[block])
+        sign = np.where(owns_plane, -1.0, 1.0)[:, None]
+        parts += [sign * slope, sign * turning]
+    return np.concatenate(parts, axis=1)
+
+
 def contact_rows(surfaces: Surfaces, points: ContactPoints, axes: np.ndarray) -> ContactRows:
     """Rows of contact points at the present places of the blocks.
 
@@ -298,6 +319,7 @@ def contact_rows(surfaces: Surfaces, points: ContactPoints, axes: np.ndarray) ->
     rows.closure[:] = points.closure
     rows.area[:] = points.area
     rows.kinematics[:] = np.concatenate(parts, axis=2)
+    rows.area_gradient[:] = area_gradients(surfaces, points)
     first = np.searchsorted(points.contact, points.contact)
     rows.keys[:] = points.face_a, points.face_b, np.arange(k) - first
     return rows

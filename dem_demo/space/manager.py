@@ -27,7 +27,14 @@ from ..compiled import FacePointArrays
 from ..contact import ContactRows
 from ..scene import SceneError
 from .blocks import SpaceBlocks
-from .contacts import MAX_TILT, ContactPoints, contact_axes, find_contacts, require_apart
+from .contacts import (
+    MAX_TILT,
+    ContactPoints,
+    area_gradients,
+    contact_axes,
+    find_contacts,
+    require_apart,
+)
 from .face_laws import FaceLaws
 from .scene import SpaceScene
 
@@ -40,7 +47,7 @@ MAX_SHIFT_PER_SKIN = 0.25  # sum of two skins: shift of a point that keeps its j
 MIN_SEEN_FRACTION = 0.5  # of an overlap of two blocks, that the deepest contact must see
 POINT_ARRAYS = {  # with the keys, these are a point
     "plane_is_of_a": bool, "local_point": float, "local_frame": float, "plane_offset": float,
-    "area": float,
+    "found_area": float, "found_at": float, "area_gradient": float,
 }  # fmt: skip
 
 
@@ -53,7 +60,9 @@ class FacePoints(ContactRows):
     local_frame (k, 3, 3), along the axes of the block of the plane: the normal out of this block,
     and the axes along which the block of the point moves where shears grow: axes 2 and 3 of the
     law, or their opposites if the plane is of a, so that shears are of a against b. plane_offset
-    (k,) in m: of the plane from the centroid of its block.
+    (k,) in m: of the plane from the centroid of its block. found_area (k,) in m2, found_at
+    (k, 12): area, and motions of a and b, when the point was found; since then the area has
+    followed its derivatives.
     """
 
     def __init__(self, blocks: SpaceBlocks, keys: np.ndarray, **arrays: np.ndarray) -> None:
@@ -70,7 +79,8 @@ class FacePoints(ContactRows):
         self.arrays.bind(blocks, "motion", "axes")
         self.arrays.bind(
             self, "block_a", "block_b", "plane_is_of_a", "local_point", "local_frame",
-            "plane_offset", "closure", "kinematics",
+            "plane_offset", "closure", "kinematics", "found_area", "found_at", "area_gradient",
+            "area",
         )  # fmt: skip
         self.update()
 
@@ -78,6 +88,7 @@ class FacePoints(ContactRows):
     def none(cls, blocks: SpaceBlocks) -> "FacePoints":
         """No points."""
         shapes = {"local_point": (3,), "local_frame": (3, 3)}
+        shapes |= {"found_at": (12,), "area_gradient": (12,)}
         arrays = {name: np.zeros((0, *shapes.get(name, ()))) for name in POINT_ARRAYS}
         return cls(blocks, np.zeros((3, 0), np.int64), **arrays)
 
@@ -101,7 +112,11 @@ class FacePoints(ContactRows):
             local_point=np.einsum("kji,kj->ki", surfaces.rotation[own], arm),
             local_frame=frame @ surfaces.rotation[other],
             plane_offset=np.einsum("ki,ki->k", points.normal, base),
-            area=points.area,
+            found_area=points.area,
+            found_at=blocks.motion[:6]
+            .T[np.stack([points.block_a, points.block_b], 1)]
+            .reshape(-1, 12),
+            area_gradient=area_gradients(surfaces, points),
         )
 
     def joined(self, rows: np.ndarray, others: "FacePoints") -> "FacePoints":

@@ -121,7 +121,7 @@ class SpaceSimulation(Simulation):
         Where it becomes larger, the balance shows an error.
         """
         balance = self.energy_balance
-        energy_before = float(balance.booked_area @ self.joints.stored_energy)
+        energy_before = float(self.contacts.area @ self.joints.stored_energy)
         is_new = self._rebuild_contacts()
         self._continue_across_seams(is_new)
         balance.booked_area = self.contacts.area.copy()

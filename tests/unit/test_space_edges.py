@@ -150,3 +150,50 @@ def test_rates_of_closure_are_its_derivatives(name, order):
             found.append(find_contacts(surfaces, reach, 0.1, corner_length=STRIP).closure[touches])
         derivative = (found[0] - found[1]) / (2 * step)
         assert rows.kinematics[touches, 0, motion] == pytest.approx(derivative, abs=2e-6)
+
+
+STIFFNESS = 1e9  # Pa/m
+
+
+def energy_of(points):
+    """Energy (J) of elastic joints of these points."""
+    return float(points.area @ (0.5 * STIFFNESS * np.maximum(points.closure, 0.0) ** 2))
+
+
+@pytest.mark.parametrize("name", [*POSES])
+@pytest.mark.parametrize("order", [0, 1])
+def test_forces_are_derivatives_of_the_stored_energy(name, order):
+    """Forces and moments of elastic joints on both blocks, the change of areas included, against
+    differences of the energy of contacts that are found anew."""
+    low, high = pose(name)
+    surfaces, points = contacts_of(*((low, high) if order else (high, low)))
+    rows = contact_rows(
+        surfaces,
+        points,
+        contact_axes(surfaces, points, np.tile([0.3, 1.0, 0.2], (len(points.area), 1))),
+    )
+    closure = np.maximum(points.closure, 0.0)
+    joint_force = np.zeros((len(closure), 3))
+    joint_force[:, 0] = points.area * STIFFNESS * closure
+    force = rows.assemble_forces(2, joint_force, 0.5 * STIFFNESS * closure**2).ravel()
+    position, rotation = surfaces.position.copy(), surfaces.rotation.copy()
+    step = 1e-7
+    derivative = np.zeros(12)
+    for motion in range(12):
+        block, axis = divmod(motion, 6)
+        energies = []
+        for sign in (1.0, -1.0):
+            surfaces.position[:], surfaces.rotation[:] = position, rotation
+            if axis < 3:
+                surfaces.position[block, axis] += sign * step
+            else:
+                turn = Rotation.from_rotvec(sign * step * np.eye(3)[axis - 3]).as_matrix()
+                surfaces.rotation[block] = rotation[block] @ turn
+            surfaces.place()
+            found = find_contacts(surfaces, np.full(2, REACH), 0.1, corner_length=STRIP)
+            energies.append(energy_of(found))
+        derivative[motion] = (energies[0] - energies[1]) / (2 * step)
+    assert force == pytest.approx(-derivative, abs=2e-5 * np.abs(force).max())
+    if name in ("between", "edge"):  # the change of areas matters
+        fixed = rows.assemble_forces(2, joint_force).ravel()
+        assert np.abs(fixed + derivative).max() > 1e-4 * np.abs(force).max()

@@ -39,6 +39,7 @@ class Drive:
 
     blocks: numbers of the blocks in the scene.
     axis: 0 and 1 for a displacement along x and y (m), 2 for a rotation about the centroid (rad).
+        In space 0 to 2 for a displacement, and 3 to 5 for a rotation about x, y and z.
     times (n,), in s, and values (n,): linear between the points; at rest before and after them.
     ramp: duration (s) of the moving average that is applied to the values, so that the velocity
         does not jump at a point.
@@ -151,7 +152,7 @@ def read_drives(
     """
     fixed_rock = tuple(i for i, block in enumerate(blocks) if block.fixed)
     drives = [
-        _read_drive(table, number, fixed_rock, files, f"{where}: drive[{i}]")
+        read_drive(table, number, fixed_rock, AXES, files, f"{where}: drive[{i}]")
         for i, table in enumerate(tables)
     ]
     driven = [(block, d.axis) for d in drives for block in d.blocks]
@@ -172,17 +173,28 @@ def read_drives(
     return *(Drive((i,), axis, (0.0,), (0.0,)) for i, axis in fixed), *drives
 
 
-def _read_drive(
-    table: Tables, number: dict[str, int], fixed_rock: tuple[int, ...], files: Files, name: str
+def read_drive(
+    table: Tables,
+    number: dict[str, int],
+    fixed_rock: tuple[int, ...],
+    axes: dict[str, int],
+    files: Files,
+    name: str,
 ) -> Drive:
-    """Build the drive of one `[[drive]]` table. Raises ValueError."""
+    """Build the drive of one `[[drive]]` table.
+
+    number: index of each block by name; fixed_rock: fixed blocks; axes: numbers of the motions by
+    their names, of which rotations begin with "turn". Raises ValueError.
+    """
     motion = table["motion"]
+    is_rotation = motion.startswith("turn")
     blocks = fixed_rock
     if "block" in table:
         blocks = (number[one_of(f"{name}.block", table["block"], tuple(number))],)
-    elif motion == "turn" or "reverse" in table or not fixed_rock:
+    elif is_rotation or "reverse" in table or not fixed_rock:
+        along = " or ".join(one for one in axes if not one.startswith("turn"))
         raise ValueError(
-            f"{name}.block: name one; without it all fixed rock moves, along x or y and without "
+            f"{name}.block: name one; without it all fixed rock moves, along {along} and without "
             "`reverse`"
         )
     keys = set(table) - {"block", "motion"}
@@ -191,15 +203,16 @@ def _read_drive(
             f"{name}: {', '.join(sorted(keys))} do not go together: give times and values "
             "(ramp, reverse), or sine, or file (scale, baseline)"
         )
-    if motion == "turn" and {"file", "sine"} & keys:
-        raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
+    if is_rotation and {"file", "sine"} & keys:
+        along = " or ".join(one for one in axes if not one.startswith("turn"))
+        raise ValueError(f"{name}: file and sine shake along {along}; for a turn give times")
     if "file" in table:
         path = read_record(files, f"{name}.file", table)
     elif "sine" in table:
         path = _sine(**table["sine"])
     else:
-        path = _polyline(table, number, np.pi / 180 if motion == "turn" else 1.0, name)
-    return Drive(blocks, AXES[motion], **path)
+        path = _polyline(table, number, np.pi / 180 if is_rotation else 1.0, name)
+    return Drive(blocks, axes[motion], **path)
 
 
 def _polyline(table: Tables, number: dict[str, int], unit: float, where: str) -> dict:

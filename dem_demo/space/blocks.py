@@ -7,6 +7,7 @@ velocities before and after it, so a free block keeps its energy.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,11 +41,28 @@ class NoBolts:
 
 def _fixed_motions(scene: SpaceScene) -> Iterator[Drive]:
     """Yield drives that hold the prescribed motions of blocks that no other drive moves."""
-    driven = {(block, drive.axis) for drive in scene.drives for block in drive.blocks}
+    driven = {(block, min(drive.axis, 3)) for drive in scene.drives for block in drive.blocks}
     for i, block in enumerate(scene.blocks):
-        for axis in (axis for name in block.prescribed for axis in MOTIONS[name]):
-            if (i, axis) not in driven:
-                yield Drive((i,), axis, (0.0,), (0.0,))
+        for name in block.prescribed:
+            axes = MOTIONS[name]
+            if (i, axes[0]) not in driven:
+                yield from (Drive((i,), axis, (0.0,), (0.0,)) for axis in axes)
+
+
+def _driven_motions(scene: SpaceScene, axes: np.ndarray) -> Iterator[Drive]:
+    """Yield the drives of a scene, for motions about the principal axes (n, 3, 3) of the blocks.
+
+    A block that rotates about a fixed direction only has constant components of this direction
+    along its own axes, so its rotation about each of them is a constant share of the prescribed
+    one.
+    """
+    for drive in scene.drives:
+        if drive.axis < 3:
+            yield drive
+            continue
+        (block,) = drive.blocks
+        for i, share in enumerate(axes[block, drive.axis - 3]):
+            yield replace(drive, axis=3 + i, values=tuple(share * np.array(drive.values)))
 
 
 class SpaceBlocks(RigidBlocks):
@@ -68,7 +86,7 @@ class SpaceBlocks(RigidBlocks):
         density = np.array([block.density for block in blocks])
         mass = np.repeat((density * surfaces.volume)[:, None], 3, axis=1)
         self.inertia = np.concatenate([mass, density[:, None] * surfaces.moments], axis=1)
-        self.drives = Drives((*_fixed_motions(scene), *scene.drives))
+        self.drives = Drives((*_fixed_motions(scene), *_driven_motions(scene, self.axes)))
         self.is_mobile = is_mobile[:, None].copy()
         self.is_free = self.is_mobile.repeat(6, axis=1)
         self.is_free[self.drives.rows, self.drives.axes] = False

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw.support.checks import integer, number, one_of
+from jointlaw.support.checks import finite, integer, number, one_of
 
 from ..scene.keys import (
     DENSITY,
@@ -16,8 +16,12 @@ from ..scene.keys import (
     POSITIVE,
     TABLE,
     TEXT,
+    some_of,
     within,
 )
+
+FIXED_MOTIONS = ("x", "y", "z", "turn")  # that may be prescribed for a block
+DRIVEN_AXES = {"x": 0, "y": 1, "z": 2, "turn_x": 3, "turn_y": 4, "turn_z": 5}  # as in `Drive`
 
 
 def vector(name: str, value: Any) -> np.ndarray:
@@ -116,7 +120,8 @@ REGION = {
 SHAPE = {"box": positive_vector, "at": vector, "corners": points, "file": TEXT}
 BLOCK = {
     "name!": TEXT, **SHAPE, "density": DENSITY, "fixed": FLAG, "load": vector,
-    "velocity": vector, "spin": vector, "fixed_motions": not_there_yet,
+    "velocity": vector, "spin": vector,
+    "fixed_motions": partial(some_of, names=FIXED_MOTIONS),
 }  # fmt: skip
 SET = {
     "dip!": DIP, "dip_direction!": ANGLE, "spacing!": POSITIVE, "law": TEXT, "through": vector,
@@ -151,7 +156,18 @@ SCENE = {
         "release_time!": POSITIVE,
     }],
     **dict.fromkeys(
-        ("drive", "monitor", "thickness", "bolt", "pressure"),
+        ("thickness", "bolt", "pressure"),
         not_there_yet,
     ),
+    "drive": [{
+        "block": TEXT, "motion!": partial(one_of, choices=tuple(DRIVEN_AXES)),
+        "ramp": NOT_NEGATIVE, "times": partial(finite, unit="s"),
+        "values": partial(finite, unit="m or degrees"),
+        "sine": {
+            "acceleration!": POSITIVE, "frequency!": POSITIVE,
+            "cycles": partial(integer, bound=1),
+        },
+        "file": TEXT, "scale": number, "baseline": FLAG,
+    }],
+    "monitor": {"points": lambda name, value: [vector(name, one) for one in LIST(name, value)]},
 }  # fmt: skip

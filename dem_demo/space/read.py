@@ -12,8 +12,9 @@ import jointlaw as jl
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of
 
-from ..scene import Files, Run, Scene, Tables, build_law, read_tables
+from ..scene import Drive, Files, Run, Scene, Tables, build_law, read_tables
 from ..scene import build as build_in_plane
+from ..scene.drives import read_drive
 from ..scene.keys import NOT_NEGATIVE, some_of
 from ..scene.laws import INTACT_ROCK, intact_rock_law
 from ..scene.read import (
@@ -26,7 +27,7 @@ from ..scene.read import (
     read_water_changes,
 )
 from .cutting import PlaneSet, cut_rock, estimate_block_count, excavation_cuts, plane_normal
-from .keys import SCENE, SIDES
+from .keys import DRIVEN_AXES, FIXED_MOTIONS, SCENE, SIDES
 from .loads import SpaceStress
 from .meshes import read_solid
 from .scene import MAX_OVERLAP, SpaceBlock, SpaceRock, SpaceScene, is_anisotropic
@@ -36,7 +37,8 @@ SHAPES = "box", "corners", "file"
 REGIONS = "box", "corners", "dip"
 DEFAULTS: Tables = {
     "gravity": np.array([0.0, 0.0, -9.81]), "seismic": np.zeros(3), "density": 2600.0, "run": {},
-    **dict.fromkeys(("block", "rock", "joint", "excavate"), ()),
+    **dict.fromkeys(("block", "rock", "joint", "excavate", "drive"), ()),
+    "monitor": {},
 }  # fmt: skip
 
 
@@ -96,6 +98,7 @@ def build(
     number = _require_names(blocks, rocks, where)
     pairs = _pairs(top["joint"], number, laws, where)
     stages = tuple(_stages(regions, top["excavate"], blocks, where))
+    drives = _drives(top["drive"], number, blocks, files, where)
     for pair in (pair for rock in rocks for pair in rock.intact_pairs):
         pairs.setdefault(pair, (INTACT_ROCK, 0.0))
     scene = SpaceScene(
@@ -106,7 +109,8 @@ def build(
         max_overlap=top["run"].get("max_overlap", MAX_OVERLAP), water=water, in_situ=in_situ,
         pressure=pressure, stages=stages,
         water_changes=read_water_changes(top.get("water", {}), where),
-        run=_run(top["run"], where),
+        run=_run(top["run"], where), drives=drives,
+        points=_history_points(top["monitor"].get("points", ()), blocks, f"{where}: monitor"),
     )  # fmt: skip
     _require_end(scene, where)
     _require_rough(scene, "rough" in top, where)
@@ -132,13 +136,59 @@ def _run(table: Tables, where: str) -> Run | None:
     return None
 
 
+def _drives(
+    tables: list[Tables], number: dict[str, int], blocks: list[SpaceBlock], files: Files, where: str
+) -> tuple[Drive, ...]:
+    """Build the drives of the `[[drive]]` tables; the `prescribed` motions of blocks are completed.
+
+    Of a fixed block that a drive moves all motions are prescribed, and of a block that a drive
+    rotates all rotations. Raises ValueError for a motion that is prescribed twice.
+    """
+    fixed_rock = tuple(i for i, block in enumerate(blocks) if block.fixed)
+    drives = [
+        read_drive(table, number, fixed_rock, DRIVEN_AXES, files, f"{where}: drive[{i}]")
+        for i, table in enumerate(tables)
+    ]
+    motion_of_axis = {axis: name[:4] for name, axis in DRIVEN_AXES.items()}  # "turn" of any axis
+    driven = [(i, motion_of_axis[drive.axis]) for drive in drives for i in drive.blocks]
+    fixed = [(i, name) for i, block in enumerate(blocks) for name in block.prescribed]
+    if len({*driven, *fixed}) < len(driven) + len(fixed):
+        raise ValueError(f"{where}: drive: a motion of a block is prescribed twice")
+    for i in sorted({i for i, _ in driven}):
+        motions = FIXED_MOTIONS if blocks[i].fixed else blocks[i].prescribed
+        names = {*motions, *(name for block, name in driven if block == i)}
+        blocks[i] = replace(blocks[i], prescribed=tuple(sorted(names)))
+    return tuple(drives)
+
+
+def _history_points(
+    points: list[np.ndarray], blocks: list[SpaceBlock], where: str
+) -> tuple[tuple[int, tuple[float, float, float]], ...]:
+    """Find the block of each history point (3,) in m, one that moves where several touch it.
+
+    Raises ValueError for a point in no block.
+    """
+    found = []
+    for i, point in enumerate(points):
+        inside = [n for n, block in enumerate(blocks) if block.solid.contains(point)]
+        if not inside:
+            raise ValueError(f"{where}.points[{i}] = {point.tolist()}: lies in no block")
+        found.append((min(inside, key=lambda n: not blocks[n].moves), tuple(point.tolist())))
+    return tuple(found)
+
+
 def _require_end(scene: SpaceScene, where: str) -> None:
-    """Require `run.end` where blocks have a velocity. Raises ValueError."""
-    moving = [block.name for block in scene.blocks if block.velocity.any() or block.spin.any()]
+    """Require `run.end` where blocks have a velocity or a drive. Raises ValueError."""
+    moving = [
+        f"block[{block.name!r}] has a velocity or spin"
+        for block in scene.blocks
+        if block.velocity.any() or block.spin.any()
+    ]
+    moving += ["drives move blocks"] * bool(scene.drives)
     if moving and scene.run is None:
         raise ValueError(
-            f"{where}: block[{moving[0]!r}] has a velocity or spin, but run.end is missing, "
-            "without which the blocks do not move: give it in s"
+            f"{where}: {moving[0]}, but run.end is missing, without which the blocks do not move: "
+            "give it in s"
         )
 
 
@@ -174,8 +224,10 @@ def _block(table: Tables, density: float, where: str, files: Files) -> SpaceBloc
     """Build a block from its table; density (kg/m3): of the scene. Raises ValueError."""
     solid = _shape(table, f"{where}: block[{table['name']!r}]", files)
     faces = len(solid.faces)
+    prescribed = tuple(table.pop("fixed_motions", ())) if not table.get("fixed") else ()
+    table.pop("fixed_motions", None)
     return SpaceBlock(
-        **{"density": density, **table, "solid": solid},
+        **{"density": density, **table, "solid": solid}, prescribed=prescribed,
         face_laws=(None,) * faces, face_axes=np.zeros((faces, 3)),
     )  # fmt: skip
 

@@ -107,6 +107,7 @@ def test_small_blocks_have_a_small_range_of_detection():
 
 
 FLAT = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
+DRIVE = '[[drive]]\nmotion = "x"\ntimes = [0, 1]\nvalues = [0, 1]\n'
 DENTED = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)] + [[0.5, 0.5, 0.5]]
 
 
@@ -124,7 +125,11 @@ DENTED = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)] + [[0.5, 0.
         (BLOCK + block("fast", box=[1, 1, 1], velocity=[1, 0, 0]), "'fast'.*run.end is missing"),
         (BLOCK + '[[joint]]\nbetween = ["base", "no"]\nlaw = "plain"\n', "joint.0..between"),
         (BLOCK + "[run]\nstep = 1\n", "run.end is missing.*leave out step"),
-        (BLOCK + '[[drive]]\nmotion = "x"\n', "drive: not there yet"),
+        (BLOCK + DRIVE, "drives move blocks, but run.end is missing"),
+        (BLOCK + DRIVE + 'block = "base"\n' + DRIVE + "[run]\nend = 1\n", "prescribed twice"),
+        (BLOCK + DRIVE.replace('"x"', '"turn"'), "motion = 'turn' is unknown"),
+        (BLOCK + DRIVE.replace('"x"', '"turn_x"'), "name one; .*along x or y or z"),
+        (BLOCK + "[monitor]\npoints = [[0, 0, 99]]\n", r"points\[0\].*lies in no block"),
         (MASS + SETS.replace("dip = 40", "dip = 91"), "dip = 91: must be from 0 to 90"),
         (MASS + SETS.replace("spacing = 2.0", "spacing = 1e-5"), "blocks; must be at most 1e"),
         (MASS + "min_width = 9\n" + SETS, "all blocks would be slivers"),

@@ -134,6 +134,29 @@ MOVING = BLOCKS | {
 }  # fmt: skip
 
 
+DRIVEN = MOVING | {
+    "drive": [
+        {
+            "block": "base",
+            "motion": "turn_y",
+            "times": [0.0, 0.01],
+            "values": [0.0, 1e-4],
+            "ramp": 0.01,
+        }
+    ]
+}
+SINE = {"acceleration": 2.0, "frequency": 100.0, "cycles": 2}
+FILES |= {
+    f"{name}.csv": "time_s,acc_m/s2\n0,0\n" + f"0.004,{value}\n0.01,0.5\n"
+    for name, value in (("one", 1.0), ("two", -2.0))
+}
+
+
+def shaken(**keys):
+    """A scene whose fixed block is shaken along x."""
+    return MOVING | {"drive": [{"motion": "x"} | keys]}
+
+
 def with_run(**keys):
     """A scene whose blocks move, with these settings of the run beside its end."""
     return MOVING | {"run": {"end": 1e-3} | keys}
@@ -240,6 +263,23 @@ PROBES = {  # path of the key: scene, where the key is in it, another value
     ),
     "excavate.start": (DUG, "excavate.0.start", 2.0),
     "excavate.release_time": (DUG, "excavate.0.release_time", 0.2),
+    "block.fixed_motions": (MOVING, "block.2.fixed_motions", ["turn"]),
+    "drive.block": (DRIVEN, "drive.0.block", "one"),
+    "drive.motion": (DRIVEN, "drive.0.motion", "turn_x"),
+    "drive.times": (DRIVEN, "drive.0.times", [0.0, 0.02]),
+    "drive.values": (DRIVEN, "drive.0.values", [0.0, 2e-4]),
+    "drive.ramp": (DRIVEN, "drive.0.ramp", 0.02),
+    "drive.sine.acceleration": (shaken(sine=SINE), "drive.0.sine.acceleration", 3.0),
+    "drive.sine.frequency": (shaken(sine=SINE), "drive.0.sine.frequency", 90.0),
+    "drive.sine.cycles": (shaken(sine=SINE | {"frequency": 400.0}), "drive.0.sine.cycles", 3),
+    "drive.file": (shaken(file="one.csv"), "drive.0.file", "two.csv"),
+    "drive.scale": (shaken(file="one.csv", scale=1.0), "drive.0.scale", 2.0),
+    "drive.baseline": (shaken(file="one.csv", baseline=False), "drive.0.baseline", True),
+    "monitor.points": (
+        MOVING | {"monitor": {"points": [[0.1, 0.0, 0.8]]}},
+        "monitor.points.0",
+        [0.2, 0.0, 0.8],
+    ),
     "run.end": (MOVING, "run.end", 0.02),
     "run.fraction": (MOVING, "run.fraction", 0.1),
     "run.step": (with_run(step=1e-5), "run.step", 5e-6),

@@ -11,6 +11,7 @@ from scipy.special import ellipj
 
 from dem_demo.contact import tabulate_first_loading
 from dem_demo.space import SpaceSimulation, parse
+from dem_demo.space.record import read_monitors
 
 FRICTION = 0.6  # carries a block up to 30.964 degrees
 GRAVITY = 9.81
@@ -205,6 +206,74 @@ def test_dropped_bricks_keep_the_balance_of_energy(law):
     assert sim.energy_balance.value["kinetic"] < 0.02 * sim.energy_balance.value["dashpots"]
 
 
+def driven(drive, end, load=(0.0, 0.0, 0.0), more=""):
+    """A slab on a base that drives may move; 255 kg/m2, so 2503 Pa on the joint."""
+    text = f"[laws.rock]\n{coulomb(FRICTION)}"
+    text += block("base", box=[6.0, 3.0, 1.0], at=[0.0, 0.0, -0.5], fixed=True)
+    text += block("slab", box=[1.0, 0.8, 0.1], at=[0.3, 0.2, 0.05], load=load)
+    return SpaceSimulation(parse(f"{text}{drive}{more}[run]\nend = {end}\n"))
+
+
+def test_base_that_tilts_lets_a_slab_slip_at_its_friction_angle():
+    """A drive rotates the base about y; the slab slips at 30.964 degrees and a little later, as the
+    base goes on."""
+    drive = '[[drive]]\nblock = "base"\nmotion = "turn_y"\n'
+    sim = driven(f"{drive}times = [0, 4]\nvalues = [0, 32]\n", 4.0)
+    angle = 0.0
+    while sim.shear_displacement(1, 0) < 1e-5 and sim.time < 4.0:
+        sim.step()
+        turned = sim.blocks.axes[0] @ sim.initial_axes[0].T
+        angle = np.degrees(np.arctan2(turned[0, 2], turned[2, 2]))
+    assert np.degrees(np.arctan(FRICTION)) - 0.03 < angle < 31.3
+    assert turned[1] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
+    assert abs(sim.energy_balance.error) < 1e-5
+
+
+def test_shaken_base_displaces_a_slab_as_newmark_s_block():
+    """A sine of 8 m/s2 along x, more than the friction of 5.89 m/s2: the slab slides as a rigid
+    block on a rigid base with Coulomb friction."""
+    sine = "sine = { acceleration = 8.0, frequency = 2.0, cycles = 2 }\n"
+    sim = driven(f'[[drive]]\nmotion = "x"\n{sine}', 0.8)
+    start = sim.blocks.motion[:2].copy()
+    base = sim.scene.drives[0]
+    limit = FRICTION * GRAVITY
+    dt = 1e-4
+    velocity = 0.0
+    relative = 0.0
+    for i in range(round(0.8 / dt)):
+        of_base = (base((i + 1) * dt) - base(i * dt)) / dt
+        velocity += np.clip(of_base - velocity, -limit * dt, limit * dt)
+        relative += (velocity - of_base) * dt
+    run_to(sim, 0.8)
+    slid = (sim.blocks.motion[0] - start[0]) @ [-1.0, 1.0]
+    assert relative < -0.01
+    assert slid == pytest.approx(relative, rel=5e-3)
+    assert abs(sim.energy_balance.error) < 1e-4
+
+
+def test_constant_force_and_constant_velocity():
+    """A load beyond friction accelerates the slab; a drive that pulls it at a constant velocity
+    does the work of friction."""
+    mass = 2600.0 * 0.08
+    sim = driven("", 0.3, load=[0.8 * mass * GRAVITY, 0.0, 0.0])
+    start = sim.blocks.motion[0, 1]
+    run_to(sim, 0.3)
+    expected = 0.5 * (0.8 - FRICTION) * GRAVITY * sim.time**2
+    assert sim.blocks.motion[0, 1] - start == pytest.approx(expected, rel=1e-3)
+    pull = '[[drive]]\nblock = "slab"\nmotion = "y"\ntimes = [0, 1]\nvalues = [0, 0.05]\n'
+    points = "[monitor]\npoints = [[0.3, 0.2, 0.06]]\n"
+    sim = driven(pull, 0.5, more=points)
+    run_to(sim, 0.5)
+    slid = sim.blocks.motion[1, 1] - 0.2
+    assert slid == pytest.approx(0.05 * (0.5 - 0.05), rel=1e-3)  # half of the ramp of 0.1 s later
+    work = sim.energy_balance.value["external_work"]
+    assert work == pytest.approx(FRICTION * mass * GRAVITY * slid, rel=1e-2)
+    reading = read_monitors(sim)
+    assert reading["point 1: y_m"] == pytest.approx(0.2 + slid)
+    assert reading["point 1: vy_m/s"] == pytest.approx(0.05, rel=1e-6)
+    assert reading["point 1: displacement_m"] == pytest.approx(slid, rel=1e-6)
+
+
 def rotor(spin, end=1.0, step=1e-3):
     """A free block of three different moments of inertia far above a fixed one, without gravity."""
     text = lines(gravity=[0.0, 0.0, 0.0]) + f"[laws.rock]\n{coulomb()}"
@@ -311,3 +380,52 @@ def test_saved_state_continues_bit_for_bit(tmp_path):
     assert one.keys() == other.keys()
     for name, value in one.items():
         assert np.array_equal(value, other[name]), name
+
+
+CUBES = """\
+[[rock]]
+name = "rock"
+box = [3.0, 3.0, 3.0]
+at = [0.0, 0.0, 1.5]
+set = [
+  { dip = 0.0, dip_direction = 0.0, spacing = 1.0 },
+  { dip = 90.0, dip_direction = 90.0, spacing = 1.0, through = [0.5, 0.0, 0.0] },
+  { dip = 90.0, dip_direction = 0.0, spacing = 1.0, through = [0.0, 0.5, 0.0] },
+]
+[in_situ]
+k0 = 0.8
+surface = [[0.0, 0.0, 20.0]]
+bottom = "fixed"
+left = "rollers"
+right = "rollers"
+front = "rollers"
+back = "rollers"
+top = "loaded"
+[[excavate]]
+box = [0.9, 0.9, 1.0]
+at = [0.0, 0.0, 1.5]
+start = 0.02
+release_time = 0.1
+"""
+
+
+def test_excavation_under_stress():
+    """The middle of 27 cubes is removed at 0.02 s: nothing moves before, its support goes within
+    0.1 s, and the rock around comes to rest with the unloading of its neighbours."""
+    sim = SpaceSimulation(parse(f"[laws.rock]\n{coulomb(0.9)}{CUBES}[run]\nend = 0.2\n"))
+    start = sim.blocks.motion[:3].copy()
+    run_to(sim, 0.019)
+    assert np.abs(sim.blocks.motion[:3] - start).max() < 1e-9
+    assert not sim.blocks.is_removed.any()
+    run_to(sim, 0.0205)
+    (middle,) = np.flatnonzero(sim.blocks.is_removed)
+    assert start[:, middle] == pytest.approx([0.0, 0.0, 1.5])
+    assert np.abs(sim.blocks.support).max() > 1e5
+    assert np.abs(sim.blocks.motion[:3] - start).max() < 1e-5  # no impact
+    run_to(sim, 0.2)
+    assert not sim.blocks.support.any()
+    displaced = sim.blocks.motion[:3] - start
+    above = np.flatnonzero((np.abs(start - [[0.0], [0.0], [2.5]]) < 1e-6).all(axis=0))[0]
+    assert displaced[2, above] < -1e-6  # the roof sinks
+    assert np.abs(sim.blocks.velocity[:3]).max() < 1e-2
+    assert abs(sim.energy_balance.error) < 1e-8

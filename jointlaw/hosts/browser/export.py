@@ -2,9 +2,11 @@
 
 import base64
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 from ... import presets
+from ...laws.joint_law import JointLaw
 from ...laws.law import Law
 from ...native.layout import (
     CELL_ROWS,
@@ -53,27 +55,33 @@ def script() -> str:
     """JavaScript of the browser page: the tables of all presets and the law as WebAssembly, both as
     text within a constant JOINTLAW, followed by the scripts of the page.
     """
-    about = {
+    laws = {name: presets.load(name) for name in presets.names()}
+    parts = [(HERE / name).read_text(encoding="utf-8") for name in SCRIPTS]
+    return "".join([constant(laws), *parts])
+
+
+def constant(laws: Mapping[str, JointLaw]) -> str:
+    """JavaScript constant JOINTLAW for law.js: WebAssembly of the law, layout and tables of laws.
+
+    laws: by name. Raises ValueError for a law that joint.c does not support.
+    """
+    rocks = {}
+    for name, law in laws.items():
+        o = law.orientation
+        rocks[name] = {
+            "a": o.a, "b": o.b, "c": o.c, "mu": law.asperity.mu, "range": law.closure_range,
+            "tables": _text(tables(law)),
+        }  # fmt: skip
+    content = {
         "numbers": {name: getattr(LawStruct, name).offset for name in (*INTEGERS, *REALS)},
         "begin": LawStruct.facet.offset,
         "columns": column_offsets(),
         "rows": list(CELL_ROWS),
         "lanes": FACET_LANES,
         "wasm": _text((HERE / WASM).read_bytes()),
+        "rocks": rocks,
     }
-    rocks = {}
-    for name in presets.names():
-        law = presets.load(name)
-        o = law.orientation
-        p = law.asperity
-        rocks[name] = {
-            "a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "range": law.closure_range,
-            "tables": _text(tables(law)),
-        }  # fmt: skip
-    parts = [(HERE / name).read_text(encoding="utf-8") for name in SCRIPTS]
-    return "".join(
-        [f'"use strict";\nconst JOINTLAW = {json.dumps(about | {"rocks": rocks})};\n', *parts]
-    )
+    return f'"use strict";\nconst JOINTLAW = {json.dumps(content)};\n'
 
 
 def tables(law: Law) -> bytes:

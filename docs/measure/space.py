@@ -60,7 +60,8 @@ def cost() -> None:
         return result
 
     rock = box([10.0, 10.0, 10.0])
-    solids = timed("cutting a rock into 1116 blocks", lambda: cut_rock(rock, SETS, 1, 0.2).solids)
+    solids = timed("cutting a rock into blocks", lambda: cut_rock(rock, SETS, 1, 0.2).solids)
+    rows[0][0] = f"cutting a rock into {len(solids)} blocks"
     surfaces = timed("setting up their surfaces", lambda: Surfaces(solids, np.ones(len(solids))))
     reach = np.full(len(solids), 2e-3)
     points = timed("finding their contacts", lambda: find_contacts(surfaces, reach, 0.1))

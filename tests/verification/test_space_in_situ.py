@@ -10,6 +10,7 @@ from scene_text import ROCK, block, coulomb, lines
 from dem_demo.cli import main
 from dem_demo.dynamics.relaxation import Verdict
 from dem_demo.scene.laws import INTACT_ROCK
+from dem_demo.space import SpaceSimulation
 from dem_demo.space.in_situ import in_situ_traction
 from dem_demo.space.read import parse
 from dem_demo.space.statics import Statics
@@ -321,3 +322,34 @@ def test_a_stress_that_closes_joints_too_far_is_refused():
 def test_k0_needs_gravity_that_points_down():
     with pytest.raises(ValueError, match="must point down"):
         mass("k0 = 1\n", top="gravity = [1, 0, -9]\n")
+
+
+@pytest.mark.parametrize("strength", [1.4, 0.9])
+def test_an_excavation_in_a_run(strength):
+    """The stages begin at rest and at their time. With friction enough the roof block stays where
+    it is, with too little it slides down between the walls."""
+    weight = UNIT_WEIGHT * 4
+    stages = STAGES.replace("start = 2.0", "start = 0.3")
+    text = roof(strength * weight / (2 * 0.8 * 4), stages) + "[run]\nend = 0.6\n"
+    sim = SpaceSimulation(parse(text))
+    assert sim.verdict == "in equilibrium"
+    while sim.time < 0.6:
+        sim.step()
+    assert sim.stage_start_times.tolist() == [0.0, 0.3]
+    assert np.flatnonzero(sim.blocks.is_removed).tolist() == [3, 4]
+    fall = sim.initial[2, 5] - sim.blocks.motion[2, 5]
+    if strength > 1.0:
+        assert abs(fall) < 1e-5
+        assert abs(sim.energy_balance.error) < 1e-6
+    else:
+        # at most as fast as without support and release times
+        assert 0.05 < fall < 0.5 * (1 - strength) * 9.81 * 0.6**2 + 0.05
+
+
+def test_rock_in_a_run_stays_under_its_stress():
+    scene = mass("k0 = 1.0\nsurface = [[0, 0, 103]]\n")
+    sim = SpaceSimulation(parse(scene.text + "[run]\nend = 0.02\n"))
+    assert sim.verdict == "in equilibrium"
+    while sim.time < 0.02:
+        sim.step()
+    assert np.abs(sim.blocks.motion[:3] - sim.initial[:3]).max() < 1e-9

@@ -431,6 +431,41 @@ def test_picture_of_blocks(record, monkeypatch):
     assert f"t = {run.times[-1]:.2f} s" in title
 
 
+def test_picture_of_bolts(monkeypatch):
+    """A bolt at its capacity and another one: ends, colours, and forces in kN at their middles."""
+    text = (
+        lines(gravity=[0.0, -9.81])
+        + "[laws.rock]\n"
+        + coulomb(0.6, 1e9, 1e9)
+        + block("base", box=[8.0, 1.0], at=[0.0, -0.5], fixed=True)
+        + block("slab", box=[4.0, 1.0], at=[0.0, 0.5])
+    )
+    for x, capacity in ((-1.0, 3e4), (1.0, 8e4)):
+        text += "[[bolt]]\n" + lines(**{"from": [x, 0.8], "to": [x, -0.5]})
+        text += lines(stiffness=1e8, capacity=capacity, pretension=2.5e4)
+    sim = Simulation(parse(f"{text}[run]\nend = 0.01\nrecord = 0.01\n"))
+    record = RunRecord(sim)
+    tensions = np.array([3e4, -1.5e4])
+    monkeypatch.setitem(record.bolts[0], "tension_N", tensions)
+    pictures = Pictures(record)
+    _, axes = pictures.figure()
+    pictures.draw(axes, 0)
+    drawn = {}
+    for one in axes.collections:
+        if isinstance(one, LineCollection) and one.get_zorder() == 4:
+            for ends in one.get_segments():
+                drawn[round(ends[0][0])] = ends, one.get_color()[0]
+    names = {-1: "bolt at its capacity", 1: "bolt"}
+    for x, (ends, colour) in drawn.items():
+        np.testing.assert_allclose(ends, [[x, 0.8], [x, -0.5]], atol=1e-4)  # settlement
+        assert same_color(colour, block_pictures.BOLT_COLOURS[names[x]])
+    assert drawn.keys() == names.keys()
+    texts = {text.get_text(): text.get_position() for text in axes.texts if "kN" in text.get_text()}
+    for label, x in (("30 kN", -1.0), ("-15 kN", 1.0)):
+        assert texts.pop(label) == pytest.approx((x, 0.15), abs=1e-4)
+    assert not texts
+
+
 def test_curves_of_a_sheared_joint(record, monkeypatch):
     run, _ = record
     readings = {

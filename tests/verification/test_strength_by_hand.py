@@ -56,10 +56,13 @@ def listed(dimension, name, direction):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_every_key_of_strength(dimension, tmp_path):
+def test_every_key_of_strength(dimension, tmp_path, capsys):
     (tmp_path / "slabs.toml").write_text(text_of(dimension))
     words = ["strength-reduction", str(tmp_path / "slabs.toml"), "--out", str(tmp_path / "out")]
     assert dem_demo.cli.main(words) == 0
+    x, z = slope_and_slab("slab", GENTLE)[2]
+    place = f"{x:.2f}, {z:.2f}" if dimension == 2 else f"{x:.2f}, 0.50, {z:.2f}"
+    assert f"initiating blocks: slab ({place})" in capsys.readouterr().out
     actual = json.loads((tmp_path / "out" / "strength.json").read_text())
     steep = listed(dimension, "steep", STEEP)
     of_both = FRICTION / (STEEP[1] / STEEP[0])

@@ -65,8 +65,7 @@ BOUND_OF = {  # keys of a row of strength reduction
     "factor_without_excluded": "limit_without_excluded",
 }
 ABOUT = """\
-Rigid rock blocks in 2-D, and their statics in space. Every contact force comes from a rock-joint
-law.
+Rigid rock blocks in two and three dimensions. Every contact force comes from a rock-joint law.
 
 `python -m dem_demo SCENE` runs a scene of the package by name, or a TOML file.
 """

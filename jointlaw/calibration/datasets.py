@@ -15,6 +15,7 @@
 """
 
 import re
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,6 +28,7 @@ from .measured import ShearCurve
 from .tables import Column, FileTable, Quantity, read_tables
 
 _FOLDER = Path(__file__).with_name("data")
+SHEAR_TESTS = _FOLDER / "shear"  # synthetic: docs/measure/synthetic_shear.py
 STRESS = Quantity(
     "normal stress of the closure test (a direct shear test goes after --shear)",
     "Pa",
@@ -186,6 +188,18 @@ def load(name: str) -> tuple[Array, Array]:
     one_of("data set", name, tuple(names()))
     record = read_closure(_FOLDER / f"{name}.csv")
     return record.stress, record.closure
+
+
+def copy_shear_tests(folder: str | Path) -> list[Path]:
+    """Copy the synthetic direct shear tests of the package, to try a calibration with them.
+
+    Three tests of one joint at 1, 3 and 5 MPa, computed from a law with noise
+    (docs/tutorial-calibrate.md). folder: created if missing; files of the same name are replaced.
+    Returns the paths of the copies.
+    """
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    return [Path(shutil.copy(path, target)) for path in sorted(SHEAR_TESTS.glob("*.csv"))]
 
 
 def read_closure(

@@ -16,9 +16,6 @@ from jointlaw.support.pyplot import FORMATS
 from ..dynamics.energy_balance import ENERGIES
 from ..dynamics.simulation import Simulation, require_text
 from ..scene import Scene, SceneError, median_size
-from ..space.record import SpaceRecord
-from ..space.record import write as write_in_space
-from ..space.simulation import SpaceSimulation
 from .folder import BLOCKS, HISTORY, LAST_VALID_STATE, STATE, clear_run
 from .monitors import update_slip_monitors
 from .pictures import Pictures, curves
@@ -45,7 +42,7 @@ def run(
     Raises ValueError, before the first step, for an `until` that cannot be reached and for a scene
     that cannot be saved.
     """
-    output = SPACE if isinstance(sim, SpaceSimulation) else PLANE
+    output = next(OUTPUTS[kind] for kind in type(sim).__mro__ if kind in OUTPUTS)
     steps_to(sim, until)
     if folder:
         require_text(sim.scene)
@@ -201,5 +198,5 @@ def write(
         write_vtk(record, folder / "vtk")
 
 
-PLANE = Output(RunRecord, write)
-SPACE = Output(SpaceRecord, write_in_space)
+# By the class of a simulation; `space.record` adds its own
+OUTPUTS: dict[type, Output] = {Simulation: Output(RunRecord, write)}

@@ -23,6 +23,7 @@ record     history and files of a run
 """
 
 from .read import load, parse
+from .record import SpaceRecord
 from .scene import SpaceBlock, SpaceRock, SpaceScene
 from .simulation import SpaceSimulation, load_simulation
 from .statics import Equilibrium, Statics
@@ -30,6 +31,7 @@ from .statics import Equilibrium, Statics
 __all__ = [
     "Equilibrium",
     "SpaceBlock",
+    "SpaceRecord",
     "SpaceRock",
     "SpaceScene",
     "SpaceSimulation",

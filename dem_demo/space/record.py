@@ -13,6 +13,7 @@ from jointlaw.support.progress import track
 
 from ..output.folder import BLOCKS, HISTORY
 from ..output.record import RunRecord, write_csv
+from ..output.run import OUTPUTS, Output
 from .contacts import Surfaces
 from .picture_files import run_drawings
 from .simulation import SpaceSimulation
@@ -272,3 +273,6 @@ def contact_mesh(joints: dict[str, np.ndarray]):
         cells = [("polygon", np.zeros((0, 3), int))]
         data = {name: [np.zeros(0)] for name in cell_columns}
     return meshio.Mesh(joints["at"], cells, point_data=of_points, cell_data=data)
+
+
+OUTPUTS[SpaceSimulation] = Output(SpaceRecord, write)

@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scene_text import ROCK, block, coulomb, lines
+from scene_text import ROCK, block, coulomb, dipping, lines
 from scipy.special import ellipj
 
+from dem_demo import Simulation
 from dem_demo.contact import tabulate_first_loading
 from dem_demo.space import SpaceSimulation, parse
 from dem_demo.space.record import read_monitors
@@ -429,3 +430,46 @@ def test_excavation_under_stress():
     assert displaced[2, above] < -1e-6  # the roof sinks
     assert np.abs(sim.blocks.velocity[:3]).max() < 1e-2
     assert abs(sim.energy_balance.error) < 1e-8
+
+
+@pytest.mark.parametrize(("degrees", "slides"), [(18.0, False), (28.0, True)])
+def test_extruded_scene_moves_as_in_the_plane(degrees, slides):
+    """Two blocks on each other slide down an incline, the upper one carried by the lower one."""
+    laws = f"[laws.low]\n{coulomb(0.4, 2e9, 1e9)}[laws.high]\n{coulomb(0.7, 2e9, 1e9)}"
+    joint = '[[joint]]\nbetween = ["one", "two"]\nlaw = "high"\n'
+    parts = {
+        "base": (8.0, 1.0, 1.5, -0.5),
+        "one": (1.2, 0.4, 0.0, 0.2),
+        "two": (0.6, 0.4, 0.1, 0.6),
+    }
+    accelerations = []
+    for in_space in (False, True):
+        x, y = dipping(degrees)
+        text = lines(gravity=[x, 0.0, y] if in_space else [x, y], law="low") + laws
+        for name, (width, height, at, above) in parts.items():
+            size = [width, 1.0, height] if in_space else [width, height]
+            place = [at, 0.0, above] if in_space else [at, above]
+            text += block(name, box=size, at=place, fixed=name == "base")
+        sim_of = SpaceSimulation if in_space else Simulation
+        sim = sim_of(parse(f"{text}{joint}[run]\nend = 0.3\nfraction = 0.1\n"))
+        start = sim.blocks.motion[:3].copy()
+        run_to(sim, 0.3)
+        path = sim.blocks.motion[:3] - start
+        accelerations.append(path[[0, 2 if in_space else 1], 1:] / sim.time**2)
+    in_plane, in_space = accelerations
+    assert in_space == pytest.approx(in_plane, rel=1e-4, abs=1e-7)
+    assert (in_plane[0] > 0.1).all() == slides
+
+
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
+    """A wall of rough joints that falls on the ground, on one thread and on two: the same bits."""
+    states = []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("JOINTLAW_THREADS", threads)
+        sim = wall(6, 6, ROCK, "end = 0.3\nsettle = false\n", gap=2e-4)
+        for _ in range(100):
+            sim.step()
+        states.append(sim.state())
+    one, two = states
+    for name, value in one.items():
+        assert np.array_equal(value, two[name]), name

@@ -894,7 +894,7 @@ static JLAW_FUNCTION void jlaw_limit_sliders_(const jlaw_law *law, double *s)
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_FACET_LANES) {
       const int row = jl_slider_row(law) + at * D + i;
       jl_real G, kappa, qs, qt;
-      jl_load_sliders(law, n, row, D, count, &qs, &qt);
+      jl_load_sliders(n, row, M * D, D, count, &qs, &qt);
       jl_evaluate_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
       const jl_real limit = o.strength * G;
       const jl_real size = jl_sqrt(qs * qs + qt * qt);
@@ -904,9 +904,9 @@ static JLAW_FUNCTION void jlaw_limit_sliders_(const jlaw_law *law, double *s)
       const jl_bits noise = jl_rounding_noise(key, at * D + i, D, qs, qt);
       qs = qs * factor, qt = qt * factor;
       jl_round_sliders(noise, &qs, &qt);
-      jl_store_sliders(law, n, row, D, count, qs, qt);
+      jl_store_sliders(n, row, M * D, D, count, qs, qt);
 #else
-      jl_store_sliders(law, n, row, D, count, qs * factor + 0.0, qt * factor + 0.0);
+      jl_store_sliders(n, row, M * D, D, count, qs * factor + 0.0, qt * factor + 0.0);
 #endif
     }
   }

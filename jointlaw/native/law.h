@@ -615,7 +615,7 @@ JL_INLINE void jl_measure_facets(const jlaw_law *law, jl_states n, int at, const
   for (int i = 0; i < D && jl_any(o->y1 > jl_column(cell, JLAW_ZETA_START)); i++) {
     jl_real G, kappa;
     jl_real qs, qt;
-    jl_load_sliders(law, n, jl_slider_row(law) + at * D + i, D, count, &qs, &qt);
+    jl_load_sliders(n, jl_slider_row(law) + at * D + i, M * D, D, count, &qs, &qt);
     const jl_real q2 = qs * qs + qt * qt;
     jl_evaluate_cell(cell, o->y1, o->f1, o->k1, o->z1, o->fz1, o->kz1, law->yields, &G, &kappa);
     const jl_mask stiff = kappa > JLAW_MIN_DIVISOR;
@@ -952,12 +952,12 @@ JL_INLINE void jl_step_facets(const jlaw_law *law, int at, const jl_joint_step *
       break; /* nor do deeper cells touch */
     const int row = k.dim + 1 + at * D + i;
     jl_real qs, qt;
-    jl_load_sliders(law, n, row, D, count, &qs, &qt);
+    jl_load_sliders(n, row, M * D, D, count, &qs, &qt);
 #ifdef JLAW_FLOAT_SLIDERS
     o.noise = jl_rounding_noise(m->rounding_key, at * D + i, D, qs, qt);
 #endif
     jl_step_cell(f, cell, &o, &qs, &qt, k);
-    jl_store_sliders(law, n, row, D, count, qs, qt);
+    jl_store_sliders(n, row, M * D, D, count, qs, qt);
   }
   if (measures) jl_measure_facets(law, n, at, &o, measures);
   if (k.yields) {
@@ -1184,7 +1184,7 @@ JL_INLINE void jl_traction(const jlaw_law *law, jl_states n, jl_joint_real F[3])
     o.qs = o.qt = jl_broadcast(0.0);
     for (int i = 0; i < D; i++) {
       jl_real qs, qt;
-      jl_load_sliders(law, n, jl_slider_row(law) + at * D + i, D, count, &qs, &qt);
+      jl_load_sliders(n, jl_slider_row(law) + at * D + i, M * D, D, count, &qs, &qt);
       o.qs += qs;
       o.qt += qt;
     }

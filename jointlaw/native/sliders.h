@@ -147,19 +147,20 @@ JL_INLINE void jl_round_sliders(jl_bits noise, jl_real *qs, jl_real *qt)
 }
 
 /* Load or store q_s and q_t of the cell of each of `count` facets: `row` of the first facet, `spacing`
- * rows from facet to facet; as jl_load and jl_store. Stored forces must have been rounded. */
-JL_INLINE void jl_load_sliders(const jlaw_law *law, jl_states n, int row, int spacing, int count,
+ * rows from facet to facet; as jl_load and jl_store. sliders: of a joint, the rows between q_s and
+ * q_t of doubles. Stored forces must have been rounded. */
+JL_INLINE void jl_load_sliders(jl_states n, int row, int sliders, int spacing, int count,
                                jl_real *qs, jl_real *qt)
 {
-  (void) law;
+  (void) sliders;
   const jl_bits pair = jl_to_bits(jl_load(n, row, spacing, count));
   *qs = jl_float_from_bits(pair);
   *qt = jl_float_from_bits(pair >> 32);
 }
-JL_INLINE void jl_store_sliders(const jlaw_law *law, jl_states n, int row, int spacing, int count,
+JL_INLINE void jl_store_sliders(jl_states n, int row, int sliders, int spacing, int count,
                                 jl_real qs, jl_real qt)
 {
-  (void) law;
+  (void) sliders;
   const jl_bits pair = jl_float_to_bits(qs) | (jl_float_to_bits(qt) << 32);
   jl_store(n, row, spacing, count, jl_from_bits(pair));
 }
@@ -169,16 +170,16 @@ JL_INLINE void jl_store_sliders(const jlaw_law *law, jl_states n, int row, int s
 #define JL_FRICTION_TOLERANCE JLAW_FRICTION_TOLERANCE
 #define JL_LIMIT_FACTOR 1.0
 
-JL_INLINE void jl_load_sliders(const jlaw_law *law, jl_states n, int row, int spacing, int count,
+JL_INLINE void jl_load_sliders(jl_states n, int row, int sliders, int spacing, int count,
                                jl_real *qs, jl_real *qt)
 {
   *qs = jl_load(n, row, spacing, count);
-  *qt = jl_load(n, row + law->facets * law->cells, spacing, count);
+  *qt = jl_load(n, row + sliders, spacing, count);
 }
-JL_INLINE void jl_store_sliders(const jlaw_law *law, jl_states n, int row, int spacing, int count,
+JL_INLINE void jl_store_sliders(jl_states n, int row, int sliders, int spacing, int count,
                                 jl_real qs, jl_real qt)
 {
   jl_store(n, row, spacing, count, qs);
-  jl_store(n, row + law->facets * law->cells, spacing, count, qt);
+  jl_store(n, row + sliders, spacing, count, qt);
 }
 #endif

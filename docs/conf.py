@@ -44,7 +44,6 @@ extensions = [
 exclude_patterns = ["_build", "gallery", "paper", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
-    "toc.empty_glob",
 ]
 nitpicky = True  # a reference that leads nowhere is an error
 nitpick_ignore_regex = [(r"py:.*", r".*")]  # types of numpy and Python live on other sites

@@ -24,8 +24,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
 
+from PIL import Image
+
 DOCS = Path(__file__).parent
 PRINTED = DOCS / "data" / "printed"
+MAX_WIDTH = 1600  # pixels of a picture on the site
+MAX_COLOURS = 256
 PAGE_LOCK = Lock()  # two parts may write to the same page
 
 
@@ -186,13 +190,23 @@ def make(name):
     with tempfile.TemporaryDirectory() as folder:
         printed, processor_time = run(part, folder)
         for picture, file in part.pictures.items():
-            shutil.copy(Path(folder) / file, DOCS / "pictures" / picture)
+            store_picture(Path(folder) / file, DOCS / "pictures" / picture)
     if part.page:
         write_table(part.page, name, first_table(printed))
     PRINTED.mkdir(exist_ok=True)
     head = f"python {part.command}  # {processor_time:.0f} s of processor time\n"
     (PRINTED / f"{name}.txt").write_text(f"{head}{printed.rstrip()}\n", encoding="utf-8")
     return printed
+
+
+def store_picture(source, target):
+    """Copy a picture; one for print is halved for the screen."""
+    with Image.open(source) as image:
+        if source.suffix == ".png" and image.width > MAX_WIDTH:
+            half = image.convert("RGB").resize((image.width // 2, image.height // 2))
+            half.quantize(MAX_COLOURS).save(target, optimize=True)
+            return
+    shutil.copy(source, target)
 
 
 def run(part, folder):

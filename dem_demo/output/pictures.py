@@ -23,14 +23,14 @@ from .monitors import shear_curve
 from .record import CREEP_RATE, FAILURE_DISPLACEMENT, RunRecord, report_lines
 
 FIXED_COLOUR = "#8d8d8d"
-MARKED_COLOUR = "#c2187a"
+MARKED_COLOUR = "#d0009a"
 WATER_COLOUR = "#1f6fd0"
 BOLT_COLOURS = {"bolt": "#00703c", "bolt at its capacity": "#8a1a8f"}
 DISPLACEMENT_COLOURS = ListedColormap(colormaps["Purples"](np.linspace(0.05, 0.65, 100)))
-JOINT_STATES = {  # colour and line style
-    "stuck": ("#3a3a3a", "-"),
-    "partly sliding": ("#e69f00", "-"),
-    "sliding": ("#d81b1b", "-"),
+JOINT_STATES = {  # colour, distinguishable with any colour vision, and line style
+    "stuck": ("#202020", "-"),
+    "partly sliding": ("#f0b400", "-"),
+    "sliding": ("#c00000", "-"),
     "open": ("#1f9ed1", "--"),
 }
 # Fractions of the shear capacity in sliding: up to the first a joint is stuck, from the second on
@@ -66,13 +66,20 @@ def stress_unit(stress: float) -> tuple[float, str]:
     return (1e-6, "MPa") if stress >= 1e6 else (1e-3, "kPa")
 
 
+def _extent(shapes: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (2,) of the box around shapes (m, 2); NaN is left out."""
+    corners = np.concatenate(shapes)
+    return np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
+
+
 class Pictures:
     """Draws the frames of a run, all to one scale.
 
     title: of the scene, unless another one is given. marked (n,): blocks to be marked, and `mark`,
     their name in the legend; by default the blocks that are unstable at the start.
 
-    low, high (2,): visible range (m), of the blocks that move. max_distance: displacement (m) at
+    low, high (2,): visible range (m), of the blocks that move; a block that has fallen farther than
+    their extent may leave it, so that the rock fills the frame. max_distance: displacement (m) at
     the end of the colours, the largest one; or the largest one of blocks that have not failed, if
     failed blocks have moved more than ten times as far, so that small displacements stay visible
     beside a falling block. largest_distance (m): of all blocks. stress: normal stress (Pa), for the
@@ -89,12 +96,14 @@ class Pictures:
         self.marked = record.unstable if marked is None else marked
         self.mark = mark
         blocks = record.scene.blocks
-        corners = np.concatenate([
-            shape for i in (0, -1)
-            for block, shape in zip(blocks, outlines(record, i), strict=True) if block.moves
-        ])  # fmt: skip
-        low = np.nanmin(corners, axis=0)
-        high = np.nanmax(corners, axis=0)
+        moving = [i for i, block in enumerate(blocks) if block.moves]
+        start = outlines(record, 0)
+        low, high = _extent([start[i] for i in moving])
+        extent = (high - low).max()
+        end = outlines(record, -1)
+        distances = np.hypot(*record.displacements(-1).T)
+        remaining = [end[i] for i in moving if distances[i] <= extent]
+        low, high = _extent([start[i] for i in moving] + remaining)
         margin = MARGIN * (high - low).max()
         self.low = low - margin
         self.high = high + margin
@@ -183,7 +192,8 @@ class Pictures:
         self._draw_blocks(axes, shapes, displacements)
         distances = np.hypot(*displacements.T)
         is_on_scale = distances <= (1.0 + ARROW_MARGIN) * self.max_distance
-        large = self.free & is_on_scale & (distances > MIN_ARROW * self.max_distance)
+        min_length = max(MIN_ARROW * self.max_distance, MIN_DISTANCE)
+        large = self.free & is_on_scale & (distances > min_length)
         tails = record.motion[i][:2].T[large]
         arrows = self.arrow_scale * displacements[large]
         axes.quiver(
@@ -195,8 +205,8 @@ class Pictures:
         self._draw_bolts(axes, i)
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
                  ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
-        title = f"{self.title}\nt = {record.times[i]:.2f} s{note}"
-        axes.figure.suptitle(escape_math(title))
+        axes.figure.suptitle(escape_math(self.title))
+        axes.set_title(escape_math(f"t = {record.times[i]:.2f} s{note}"), loc="left")
 
     def _draw_blocks(self, axes: Axes, shapes: list[np.ndarray], displacements: np.ndarray) -> None:
         """Draw the blocks, coloured by displacement, and their names if they are few."""

@@ -38,7 +38,7 @@ from .drawing import Drawing, Motion
 MISSING = "no pictures of blocks in space: they need pyvista: pip install 'jointlaw[view]'"
 STATE_COLOURS = {  # distinguishable with any colour vision
     "fixed": "#c9cdd2",
-    "stable": "#3fae8f",
+    "stable": "#1b8a6b",
     "unstable": "#d55e00",
     "not decided": "#f0d442",
 }

@@ -37,16 +37,23 @@ def compare(scene: Scene, seeds: Sequence[int], until: float | None) -> Iterator
             rock = alone(scene, name, seed)
             record, message = run_to_failure(rock, until)
             yield {"law": "joint", "seed": seed, "laws": {}, **_row(record, message)}
-            stresses = _mean_stresses(record)
-            laws = {
-                name: coulomb_of_same_strength(law, stress)
-                for (name, law), stress in zip(rock.laws.items(), stresses, strict=True)
-                if isinstance(law, jl.JointLaw)
-            }
-            settings = replace(rock.run, max_overlap=COULOMB_OVERLAP)
-            coulomb_rock = replace(rock, laws=rock.laws | laws, run=settings)
+            coulomb_rock, laws = with_coulomb_laws(rock, record)
             record, message = run_to_failure(coulomb_rock, until)
             yield {"law": "coulomb", "seed": seed, "laws": laws, **_row(record, message)}
+
+
+def with_coulomb_laws(scene: Scene, record: RunRecord) -> tuple[Scene, dict[str, jl.CoulombLaw]]:
+    """The scene with Coulomb's law of the same strength in place of each joint law, and these laws.
+
+    record: of a run of the scene, for the normal stresses of its joints at the start.
+    """
+    laws = {
+        name: coulomb_of_same_strength(law, stress)
+        for (name, law), stress in zip(scene.laws.items(), _mean_stresses(record), strict=True)
+        if isinstance(law, jl.JointLaw)
+    }
+    settings = replace(scene.run, max_overlap=COULOMB_OVERLAP)
+    return replace(scene, laws=scene.laws | laws, run=settings), laws
 
 
 def _row(record: RunRecord, message: str) -> dict:

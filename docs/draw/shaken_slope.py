@@ -1,6 +1,6 @@
-"""Slip of the scene `shaken-slope` with plain Coulomb and with the joint law, and of Newmark's
-sliding block (1965): `python docs/draw/shaken_slope.py FOLDER` writes FOLDER/shaken-slope.png and
-prints the slips."""
+"""Slip of the scene `shaken-slope` with the joint law, with Coulomb's law of the same strength and
+with the friction of the asperities alone, and of Newmark's sliding block (1965):
+`python docs/draw/shaken_slope.py FOLDER` writes FOLDER/shaken-slope.png and prints the slips."""
 
 import numpy as np
 from command_line import output_folder
@@ -8,31 +8,46 @@ from matplotlib.figure import Figure
 from scipy.integrate import cumulative_trapezoid
 
 import dem_demo
+from dem_demo.studies.compare import with_coulomb_laws
 from jointlaw.support.pyplot import style, written
 
 DIP = np.radians(25.0)  # of the scene
 GRAVITY = 9.81  # m/s2
 FRICTION = 0.6  # of Newmark's block and of the scene with Coulomb
-SCENES = {"shaken-slope-plain": "blocks, Coulomb 0.6", "shaken-slope": "blocks, joint law"}
 
 
 @style()
 def main(folder):
-    """Run both scenes and draw their slip beside the slip of Newmark's block."""
+    """Run the scenes and draw their slip beside the slip of Newmark's block."""
     figure = Figure(figsize=(7, 4.5))
     axes = figure.subplots()
-    for scene, label in SCENES.items():
-        record, _ = dem_demo.run(dem_demo.Simulation(dem_demo.load(scene)))
-        slip = mean_slip(record)
-        axes.plot(record.times, 1e3 * slip, label=label)
-        print(f"{label}: {1e3 * slip[-1]:.3g} mm")
+    scene = dem_demo.load("shaken-slope")
+    record, _ = dem_demo.run(dem_demo.Simulation(scene))
+    equal_strength, _ = with_coulomb_laws(scene, record)
+    plain = dem_demo.load("shaken-slope-plain")
+    draw_slip(axes, record, "blocks, joint law", "-")
+    for other, label, line in (
+        (equal_strength, "blocks, Coulomb of the same strength", "--"),
+        (plain, "blocks, Coulomb 0.6", "-."),
+    ):
+        record, _ = dem_demo.run(dem_demo.Simulation(other))
+        draw_slip(axes, record, label, line)
     drive = next(drive for drive in record.scene.drives if drive.order)
     times, slip = newmark_slip(drive, record.times[-1])
     print(f"Newmark: {1e3 * slip[-1]:.3g} mm")
     axes.plot(times, 1e3 * slip, "k:", label="Newmark's block, 0.6")
     axes.set(xlabel="time (s)", ylabel="slip relative to the rock below (mm)")
-    figure.legend(loc="outside lower center", ncols=3)
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.set_ylim(bottom=0)
+    figure.legend(loc="outside lower center", ncols=2)
     written(figure, folder / "shaken-slope.png")
+
+
+def draw_slip(axes, record, label, line):
+    """Draw and print the mean slip of a run."""
+    slip = mean_slip(record)
+    axes.plot(record.times, 1e3 * slip, line, label=label)
+    print(f"{label}: {1e3 * slip[-1]:.3g} mm")
 
 
 def mean_slip(record):

@@ -66,6 +66,25 @@ def barton_bandis(slip, normal_stress, peak_slip, roughness, residual_friction):
     return normal_stress * np.tan(np.radians(angle))
 
 
+def with_corners(slip, corners):
+    """The path of a cycle with all points at which Masing's branches have corners.
+
+    corners: slips at which the first loading has corners, in the unit of the path.
+    """
+    largest = slip.max()
+    ends = int(np.argmax(slip)), int(np.argmin(slip))
+    loading, unloading, reloading = np.split(slip, [ends[0] + 1, ends[1] + 1])
+    corners = np.asarray(corners)[np.asarray(corners) < largest]
+    legs = [
+        np.union1d(loading, corners),
+        np.union1d(unloading, largest - 2 * corners)[::-1],
+        np.union1d(reloading, 2 * corners - largest),
+    ]
+    legs[1] = legs[1][legs[1] < largest]
+    legs[2] = legs[2][legs[2] > -largest]
+    return np.concatenate(legs)
+
+
 def masing(first_loading, slip):
     """Shear stress of a cycle to the largest slip, back to its opposite, and up again."""
     largest_slip = slip.max()
@@ -100,17 +119,21 @@ def three_laws(plt):
         for peak_slip in (0.2, 0.6, 1.5)
     ]
     barton_fit = min(barton_fits, key=lambda fit: fit.cost).x
+    coulomb_path = with_corners(slip, [coulomb_fit[1] / coulomb_fit[0]])
+    barton_path = with_corners(slip, barton_fit[0] * np.array(RELATIVE_SLIP))
     curves = (
-        ("jointlaw", stress, JOINTLAW_COLOUR),
-        ("Coulomb, fitted to it", masing(lambda x: coulomb(x, *coulomb_fit), slip), COULOMB_COLOUR),
-        ("Barton-Bandis, fitted to it", masing(lambda x: barton_curve(x, *barton_fit), slip),
-         BARTON_COLOUR),
+        ("jointlaw", slip, stress, JOINTLAW_COLOUR),
+        ("Coulomb, fitted to it", coulomb_path,
+         masing(lambda x: coulomb(x, *coulomb_fit), coulomb_path), COULOMB_COLOUR),
+        ("Barton-Bandis, fitted to it", barton_path,
+         masing(lambda x: barton_curve(x, *barton_fit), barton_path), BARTON_COLOUR),
     )  # fmt: skip
     figure, axes = plt.subplots(figsize=(7.8, 5.4))
-    for i, (name, values, colour) in enumerate(curves):
-        dissipated = trapezoid(values[STEPS_PER_LEG:], slip[STEPS_PER_LEG:])  # MPa µm = J/m2
+    for i, (name, path, values, colour) in enumerate(curves):
+        reversal = int(np.argmax(path))
+        dissipated = trapezoid(values[reversal:], path[reversal:])  # MPa µm = J/m2
         print(f"{name}: {dissipated:.2f} J/m2 dissipated in a cycle")
-        axes.plot(slip, values, color=colour, zorder=3 - i)
+        axes.plot(path, values, color=colour, zorder=3 - i)
         axes.text(0.03, 0.95 - 0.09 * i, f"{name}: {dissipated:.1f} J/m² dissipated", va="top",
                   color=colour, weight="bold", transform=axes.transAxes)  # fmt: skip
     axes.set(
@@ -192,11 +215,11 @@ def strength_surface(plt):
     law = replace(ANISOTROPIC_LAW, mating_length=0.6e-6, resolution=jl.Resolution(4, 8, 6))
     normal_stresses = np.linspace(1, 20, 9)  # MPa
     quadrant = np.array([[strength(law, 1e6 * stress, azimuth)
-                          for azimuth in np.radians(np.arange(0, 91, 15))]
+                          for azimuth in np.radians(np.arange(0, 91, 7.5))]
                          for stress in normal_stresses])  # fmt: skip
     mirrored = quadrant[:, -2::-1]
     strengths = np.hstack([quadrant, mirrored, quadrant[:, 1:], mirrored])
-    azimuths = np.radians(np.arange(0, 361, 15))
+    azimuths = np.radians(np.arange(0, 361, 7.5))
     x = strengths * np.cos(azimuths)
     y = strengths * np.sin(azimuths)
     z = np.broadcast_to(normal_stresses[:, None], x.shape)
@@ -218,7 +241,7 @@ def strength_surface(plt):
     envelopes = figure.add_subplot(2, 2, 4)
     for k, name, colour in (
         (0, "along axis 2", JOINTLAW_COLOUR),
-        (6, "along axis 3", AXIS_3_COLOUR),
+        (12, "along axis 3", AXIS_3_COLOUR),
     ):
         envelopes.plot(normal_stresses, strengths[:, k], color=colour, label=name)
     envelopes.set(xlabel="σ (MPa)", ylabel="strength (MPa)")

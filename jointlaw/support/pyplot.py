@@ -22,7 +22,7 @@ STYLE: dict[str, Any] = {
     "legend.framealpha": 0.9,
     "lines.linewidth": 1.5,
     "lines.markersize": 4,
-    "savefig.dpi": 150,
+    "savefig.dpi": 300,
 }
 
 

@@ -29,7 +29,6 @@ from PIL import Image
 DOCS = Path(__file__).parent
 PRINTED = DOCS / "data" / "printed"
 MAX_WIDTH = 1600  # pixels of a picture on the site
-MAX_COLOURS = 256
 PAGE_LOCK = Lock()  # two parts may write to the same page
 
 
@@ -204,7 +203,7 @@ def store_picture(source, target):
     with Image.open(source) as image:
         if source.suffix == ".png" and image.width > MAX_WIDTH:
             half = image.convert("RGB").resize((image.width // 2, image.height // 2))
-            half.quantize(MAX_COLOURS).save(target, optimize=True)
+            half.save(target, optimize=True)
             return
     shutil.copy(source, target)
 

@@ -72,6 +72,13 @@ def _extent(shapes: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
 
 
+def length_unit(length: float) -> tuple[float, str]:
+    """Factor from m to the unit in which a displacement (m) is written, and the unit."""
+    if length < 1e-4:
+        return 1e6, "µm"
+    return (1e3, "mm") if length < 0.1 else (1.0, "m")
+
+
 class Pictures:
     """Draws the frames of a run, all to one scale.
 
@@ -116,8 +123,7 @@ class Pictures:
         is_clipped = len(kept) > 0 and self.largest_distance > MAX_COLOUR_RATIO * of_kept
         self.max_distance = of_kept if is_clipped else max(self.largest_distance, MIN_DISTANCE)
         self.arrow_scale = float(f"{0.5 * size / self.max_distance:.0e}")
-        is_small = self.max_distance < 0.1
-        self.length_factor, self.length_unit = (1e3, "mm") if is_small else (1.0, "m")
+        self.length_factor, self.length_unit = length_unit(self.max_distance)
         frames = [frame["normal_stress_Pa"] for frame in record.joints]
         at_start, whole_run = (stress[stress > 0] for stress in (frames[0], np.concatenate(frames)))
         compressive = at_start if len(at_start) else whole_run
@@ -206,7 +212,9 @@ class Pictures:
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
                  ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
         axes.figure.suptitle(escape_math(self.title))
-        axes.set_title(escape_math(f"t = {record.times[i]:.2f} s{note}"), loc="left")
+        axes.text(0.01, 0.98, escape_math(f"t = {record.times[i]:.2f} s{note}"), va="top",
+                  transform=axes.transAxes, zorder=7, gid="note",
+                  bbox={"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 2})  # fmt: skip
 
     def _draw_blocks(self, axes: Axes, shapes: list[np.ndarray], displacements: np.ndarray) -> None:
         """Draw the blocks, coloured by displacement, and their names if they are few."""

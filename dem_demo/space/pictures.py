@@ -30,6 +30,7 @@ from ..output.pictures import (
     MAX_COLOUR_RATIO,
     MAX_FRAMES,
     MIN_DISTANCE,
+    length_unit,
 )
 from ..output.record import FAILURE_DISPLACEMENT
 from .drawing import Drawing, Motion
@@ -133,8 +134,7 @@ class SpacePictures:
         size = float(np.median([solid.size for solid in solids])) if solids else drawing.size
         self.largest_distance = float(distances.max(initial=0.0))
         self.max_distance, self.is_clipped = colour_limit(distances, size)
-        is_small = self.max_distance < 0.1
-        self.length_factor, self.length_unit = (1e3, "mm") if is_small else (1.0, "m")
+        self.length_factor, self.length_unit = length_unit(self.max_distance)
         ends = [self._project(self._vertices(motion)) for motion in self._extremes()]
         plane = np.concatenate(ends)
         low, high = np.nanmin(plane, axis=0), np.nanmax(plane, axis=0)

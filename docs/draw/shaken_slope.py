@@ -38,7 +38,8 @@ def main(folder):
     axes.plot(times, 1e3 * slip, "k:", label="Newmark's block, 0.6")
     axes.set(xlabel="time (s)", ylabel="slip relative to the rock below (mm)")
     axes.set_yscale("symlog", linthresh=1.0)
-    axes.set_ylim(bottom=0)
+    axes.set_yticks([0, 1, 10, 100], ["0", "1", "10", "100"])
+    axes.set_ylim(bottom=-0.2)
     figure.legend(loc="outside lower center", ncols=2)
     written(figure, folder / "shaken-slope.png")
 

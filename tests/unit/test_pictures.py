@@ -428,7 +428,8 @@ def test_picture_of_blocks(record, monkeypatch):
     assert "unstable block" in texts
     title = figure.get_suptitle()
     assert title == "known motion"
-    assert axes.get_title(loc="left").startswith(f"t = {run.times[-1]:.2f} s")
+    (note,) = (text.get_text() for text in axes.texts if text.get_gid() == "note")
+    assert note.startswith(f"t = {run.times[-1]:.2f} s")
 
 
 def test_picture_of_bolts(monkeypatch):

@@ -49,6 +49,8 @@ MIN_DISTANCE = 1e-6  # m: smaller displacements have no colour and no arrow
 MIN_ARROW = 0.02  # of the largest displacement: smaller ones get no arrow
 ARROW_MARGIN = 1.0  # a block has an arrow up to this share beyond the end of the colours
 MAX_COLOUR_RATIO = 10.0  # largest displacement over the largest one of blocks that have not failed
+WIDTH, HEIGHT = 6.5, 6.0  # inches: largest extent of the blocks in a figure
+NOTE_LINE_HEIGHT = 0.19  # inches, of time and outcomes
 MARGIN = 0.07  # of the extent of the blocks
 LINE_WIDTHS = 0.7, 2.0, 1.2  # points: without stress, more at the scale; stress at the limit
 
@@ -149,7 +151,7 @@ class Pictures:
     def figure(self) -> tuple[Figure, Axes]:
         """Create an empty frame with legend and colour bar."""
         width, height = self.high - self.low
-        inches = min(6.5, 6.0 * width / height)
+        inches = min(WIDTH, HEIGHT * width / height)
         figure = Figure(figsize=(max(inches + 1.0, 7.5), inches * height / width + 2.6))
         handles = [Line2D([], [], label=label, **line) for label, line in self._legend()]
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
@@ -209,12 +211,14 @@ class Pictures:
             axes.plot(*water.line.T, color=WATER_COLOUR, lw=1.5, ls="-.", zorder=4)
         self._draw_joints(axes, i)
         self._draw_bolts(axes, i)
+        width, height = self.high - self.low
+        line = NOTE_LINE_HEIGHT * width / min(WIDTH, HEIGHT * width / height)  # m
+        top = self.high[1] + line * (1 + note.count("\n"))  # the note hides no block
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
-                 ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
+                 ylim=(self.low[1], top), ylabel="y (m)")  # fmt: skip
         axes.figure.suptitle(escape_math(self.title))
         axes.text(0.01, 0.98, escape_math(f"t = {record.times[i]:.2f} s{note}"), va="top",
-                  transform=axes.transAxes, zorder=7, gid="note",
-                  bbox={"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 2})  # fmt: skip
+                  transform=axes.transAxes, zorder=7, gid="note")  # fmt: skip
 
     def _draw_blocks(self, axes: Axes, shapes: list[np.ndarray], displacements: np.ndarray) -> None:
         """Draw the blocks, coloured by displacement, and their names if they are few."""

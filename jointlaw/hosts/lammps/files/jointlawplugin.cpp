@@ -80,14 +80,21 @@ static uint64_t hashed(uint64_t value, const char *text)
   for (; *text; text++) value = (value ^ static_cast<unsigned char>(*text)) * 0x100000001B3ULL;
   return value;
 }
-// A vector after a rotation by a rotation vector; exact to 1e-13 up to 0.5 rad
-static Vector rotated(const Vector &a, const Vector &rotation)
+// A rotation by a rotation vector; exact to 1e-13 up to 0.5 rad
+struct Rotation {
+  Vector vector;
+  double sine, cosine;    // sin(x)/x and (1 - cos(x))/x^2 of the angle x
+  explicit Rotation(const Vector &v) : vector(v)
+  {
+    const double x = dot(v, v);
+    sine = 1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0 - x * (1.0 / 5040.0 - x * (1.0 / 362880.0))));
+    cosine = 0.5 - x * (1.0 / 24.0 - x * (1.0 / 720.0 - x * (1.0 / 40320.0 - x * (1.0 / 3628800.0))));
+  }
+};
+static Vector rotated(const Vector &a, const Rotation &rotation)
 {
-  const double x = dot(rotation, rotation);
-  const double sine = 1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0 - x * (1.0 / 5040.0 - x / 362880.0)));
-  const double cosine = 0.5 - x * (1.0 / 24.0 - x * (1.0 / 720.0 - x * (1.0 / 40320.0 - x / 3628800.0)));
-  const Vector across = cross(rotation, a);
-  return sum(sum(a, sine, across), cosine, cross(rotation, across));
+  const Vector across = cross(rotation.vector, a);
+  return sum(sum(a, rotation.sine, across), rotation.cosine, cross(rotation.vector, across));
 }
 
 // Closure under this normal stress (Pa), or a lower one if yielding asperities do not reach it
@@ -263,7 +270,7 @@ class PairJointlaw : public Pair {
   void find_sphere_contacts(int, const int *, int);
   void find_body_contacts(int, const int *, int);
   bool surface_distance(const Opposite &, double, double &) const;
-  bool find_slip(const Contact &, const double *, const int *, int, const Vector &, double, Vector &) const;
+  bool find_slip(const Contact &, const double *, const int *, int, const Rotation &, double, Vector &) const;
   void prepare_step(const Contact &, const int *, int);
   void perform_steps();
   void apply_forces(const Step &, double *, const double *);
@@ -723,7 +730,7 @@ void PairJointlaw::find_body_contacts(int i, const int *partners, int count)
 // Returns false if it is unknown: another point of a body is opposite, and the last one is no longer a
 // neighbour.
 bool PairJointlaw::find_slip(const Contact &c, const double *extra, const int *partners, int count,
-                             const Vector &rotation, double dt, Vector &slip) const
+                             const Rotation &rotation, double dt, Vector &slip) const
 {
   const Vector wi = vector(atom->omega[c.i]), wj = vector(atom->omega[c.j]);
   const Vector last = vector(extra + SEPARATION);
@@ -754,19 +761,21 @@ void PairJointlaw::prepare_step(const Contact &c, const int *partners, int count
   AtomJoints &own = joints_of->of[i];
   const Law *law = law_between(atom->type[i], atom->type[j]);
   const Vector wi = vector(atom->omega[i]), wj = vector(atom->omega[j]);
-  const Vector vi = sum(vector(atom->v[i]), 1.0, cross(wi, c.arm_i));
-  const Vector vj = sum(vector(atom->v[j]), 1.0, cross(wj, c.arm_j));
-  const Vector slide = sum(vj, -1.0, vi);    // of the surface of j relative to i
-  const Vector rotation = times(0.5 * dt, sum(wi, 1.0, wj));    // in the step, the mean of both
-  Vector slip = times(dt, slide);
+  const Rotation rotation(times(0.5 * dt, sum(wi, 1.0, wj)));    // in the step, the mean of both
   int index = 0;
   while (index < own.n && to_integer(own.joint(index, size)[rows + PARTNER_KEY]) != c.key) index++;
-  if (index < own.n) {
-    const double *extra = own.joint(index, size) + rows;
-    // the joint of another law or other bodies is not found again, and ends after this step
-    if (!belongs_to(extra, c, law)) index = own.n;
-    else if (!find_slip(c, extra, partners, count, rotation, dt, slip) && is_setup) index = own.n;
+  // the joint of another law or other bodies is not found again, and ends after this step
+  if (index < own.n && !belongs_to(own.joint(index, size) + rows, c, law)) index = own.n;
+  Vector slide = {0.0, 0.0, 0.0};    // velocity of the surface of j relative to i, where it is needed
+  if (index == own.n || planar || damping > 0.0) {
+    const Vector vi = sum(vector(atom->v[i]), 1.0, cross(wi, c.arm_i));
+    const Vector vj = sum(vector(atom->v[j]), 1.0, cross(wj, c.arm_j));
+    slide = sum(vj, -1.0, vi);
   }
+  Vector slip = times(dt, slide);
+  if (index < own.n
+      && !find_slip(c, own.joint(index, size) + rows, partners, count, rotation, dt, slip) && is_setup)
+    index = own.n;
   const bool fresh = index == own.n;
   if (fresh) {
     // bodies that touch at the start of a run do so except for rounding, and may have a bond
@@ -795,8 +804,7 @@ void PairJointlaw::prepare_step(const Contact &c, const int *partners, int count
     return;
   }
   // axis 2 rotates with the bodies (in a plane about the normal only) and follows the normal
-  const Vector turn = planar ? times(dot(rotation, c.n), c.n) : rotation;
-  axis2 = rotated(axis2, turn);
+  axis2 = rotated(axis2, planar ? Rotation(times(dot(rotation.vector, c.n), c.n)) : rotation);
   axis2 = unit(sum(axis2, -dot(axis2, c.n), c.n));
   const Vector axis3 = cross(axis2, c.n);    // axis 1 is -n: motion of j into i closes
   extra[PARTNER_ID] = from_integer(atom->tag[j]);

@@ -33,6 +33,7 @@ SMALLEST_FACTOR = 1 / 64
 LARGEST_FACTOR = 64.0
 TOLERANCE = 1e-3  # of the factor
 STRESSES = 7  # at which the strength of a rough law gets a tangent
+CHECKED_STRESSES = 61  # at which lines of a strength that is not concave must lie above it
 STRESS_RANGE = 1e-3, 3.0  # of the largest overburden stress: where they lie
 SLOPE_STEP = 1.05  # ratio of the two stresses that give a tangent
 BALANCED = 1e-6  # unbalanced forces over the largest load that are rounding of the solver
@@ -124,8 +125,9 @@ def overburden_stress(scene: Scene) -> float:
 def strength_of(law: jl.Law, stress: float) -> Strength:
     """Strength of a law, for stresses of the order of `stress` (Pa).
 
-    Of a rough law: tangents of its peak strength in direct shear. It is a concave function of the
-    normal stress, so that tangents lie above it and the bound stays a bound.
+    Of a rough law: tangents of its peak strength in direct shear, which lie above a concave
+    function of the normal stress. The strength of slopes that degrade by stress is not concave
+    everywhere; a line that it exceeds is raised, so that the bound stays a bound.
     """
     if type(law) is jl.CoulombLaw:  # a subclass may have more elements
         return Strength(np.array([law.cohesion]), np.array([law.friction]), law.tension)
@@ -134,7 +136,13 @@ def strength_of(law: jl.Law, stress: float) -> Strength:
     peaks = np.array([peak_strength(law, s) for s in stresses])
     strength_nearby = np.array([peak_strength(law, SLOPE_STEP * s) for s in stresses])
     friction = (strength_nearby - peaks) / ((SLOPE_STEP - 1.0) * stresses)
-    return Strength(peaks - friction * stresses, friction, law.tensile_strength)
+    cohesion = peaks - friction * stresses
+    if (np.diff(friction) > 0.0).any():  # not concave
+        stresses = np.geomspace(low, high, CHECKED_STRESSES)
+        peaks = np.array([peak_strength(law, s) for s in stresses])
+        excess = peaks - (cohesion[:, None] + friction[:, None] * stresses)  # (lines, stresses)
+        cohesion += np.maximum(excess.max(axis=1), 0.0)
+    return Strength(cohesion, friction, law.tensile_strength)
 
 
 def peak_strength(law: jl.Law, stress: float) -> float:

@@ -20,6 +20,7 @@ from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
 from dem_demo.scene import load, parse, rotation
 from dem_demo.studies import strength
+from dem_demo.studies.limit_analysis import limit_factor
 from dem_demo.studies.strength import alone, critical_tilt, factor_of_safety, weakened
 
 DIP = 32.0
@@ -76,6 +77,42 @@ def test_factor_of_safety_of_a_block_on_a_plane(bonded):
     # The search loads the joint in one step, in which asperities that still stick have less shear
     # stress than where they were closed before they are sheared.
     assert 0.85 * by_hand < factor < by_hand
+
+
+def peak_in_one_step(law, stress):
+    """Largest shear stress (Pa) at a normal stress (Pa) that a slip in one step reaches, as in the
+    search for the equilibrium: slopes degrade at the end of the step."""
+    slips = np.geomspace(2e-4, 3e-3, 25)
+    records = [jl.direct_shear(law.joint(), to=[u], normal=stress, steps=1) for u in slips]
+    return max(float(record.shear_stress[-1]) for record in records)
+
+
+def test_factor_of_safety_of_slopes_that_fall_with_stress():
+    """A planar slide on a joint whose slopes are halved at its normal stress: with and without the
+    degradation, the factor is the strength of the law alone over the shear stress of the weight.
+
+    The moment of the weight makes the normal stress uneven, which matters where the strength is
+    curved: the two contact points lie at the ends of the joint."""
+    dip = math.radians(DIP)
+    normal_stress = UNIT_WEIGHT * math.cos(dip)  # the block is 1 m high
+    shear_stress = UNIT_WEIGHT * math.sin(dip)
+    scene = parse(SCENE)
+    length = np.ptp(scene.blocks[1].corners[:, 0])
+    uneven = math.tan(dip) / length
+    law = replace(scene.laws["rock"], mating_length=5e-3)
+    factors = {}
+    for degradation_stress in (math.inf, normal_stress):
+        one = replace(law, degradation_stress=degradation_stress)
+        factor = factor_of_safety(replace(scene, laws={"rock": one}))
+        ends = [normal_stress * (1 + i * uneven) for i in (-1, 1)]
+        by_hand = np.mean([peak_in_one_step(one, stress) for stress in ends]) / shear_stress
+        assert factor == pytest.approx(by_hand, rel=SEARCH_TOLERANCE)
+        by_path = np.mean([peak_shear_stress(one, stress) for stress in ends]) / shear_stress
+        assert factor == pytest.approx(by_path, rel=0.025)
+        bound = limit_factor(replace(scene, laws={"rock": one}))
+        assert factor < bound * (1 + SEARCH_TOLERANCE)  # its strength by hand has as many steps
+        factors[degradation_stress] = factor
+    assert factors[normal_stress] < 0.9 * factors[math.inf]
 
 
 @pytest.mark.slow

@@ -276,16 +276,34 @@ def equilibrium_displacements(
     predictor. unstable (n,): blocks that need no equilibrium; they move away, so their contacts and
     bolts bear nothing.
     """
+    search, is_unstable = _search_as_drawn(scene, unstable)
+    start = search.stick_predictor() if guess is None else guess
+    solution = search.solve(start, is_unstable, name_unstable=False)
+    return solution.displacement if solution.verdict is Verdict.EQUILIBRIUM else None
+
+
+def stick_displacements(scene: Scene, unstable: np.ndarray | None = None) -> np.ndarray:
+    """Displacements (m,) of the free motions of a scene as drawn if no joint can slide.
+
+    A guess for `equilibrium_displacements`, with the same units and `unstable` (n,) blocks.
+    """
+    search, _ = _search_as_drawn(scene, unstable)
+    return search.stick_predictor()
+
+
+def _search_as_drawn(
+    scene: Scene, unstable: np.ndarray | None
+) -> tuple[EquilibriumSearch, np.ndarray]:
+    """The search of a scene as drawn, without forces on the contacts and bolts of the unstable
+    blocks; and the mask (n,) of these."""
     blocks = Blocks(scene)
     joints = Joints(scene)
     manager = ContactManager(scene, blocks.motion)
     sliding = create_joints(scene, blocks, manager, joints)
     search = EquilibriumSearch(static_system(scene, blocks, manager, joints, sliding))
-    known_unstable = np.zeros(len(blocks.is_free), bool) if unstable is None else unstable
+    is_unstable = np.zeros(len(blocks.is_free), bool) if unstable is None else unstable
     contacts = manager.contacts
-    has_moved_away = known_unstable[contacts.block_a] | known_unstable[contacts.block_b]
+    has_moved_away = is_unstable[contacts.block_a] | is_unstable[contacts.block_b]
     search.area[np.tile(has_moved_away, 2)] = 0.0
-    search.bolts.release(known_unstable)
-    start = search.stick_predictor() if guess is None else guess
-    solution = search.solve(start, known_unstable, name_unstable=False)
-    return solution.displacement if solution.verdict is Verdict.EQUILIBRIUM else None
+    search.bolts.release(is_unstable)
+    return search, is_unstable

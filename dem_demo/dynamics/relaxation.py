@@ -6,11 +6,19 @@ in every iteration the law takes the total displacement in one step from its vir
 iterations would leave joints sheared by displacements several times the static ones, and a slope
 then falls at 0.97 of its strength.
 
+Near the limit of the strength, iterations are slow: friction makes the stiffness unsymmetric, and
+blocks oscillate with growing amplitude (flutter) unless the damping is far above the critical one
+of the slowest motion. Implicit steps of an overdamped motion continue therefore, as in
+pseudo-transient continuation (Kelley and Keyes 1998), with time steps that grow while the linear
+model of a step predicts the unbalanced force. They are stable for every time step, and pass into
+Newton's method. After each step a few overdamped iterations smooth what contacts that opened,
+closed or slid have disturbed.
+
 Where Newton's method stops at a maximum of the unbalanced force, relaxation goes on, because it
 follows the forces. Where there is no equilibrium, the unbalanced force no longer falls while
 displacements grow at a steady rate: both together are the verdict "no equilibrium". A stall of the
 unbalanced force alone is none: blocks that rearrange stall for thousands of iterations. A search
-without a decision within the limit of iterations is reported as such.
+without a decision within the limits of steps and iterations is reported as such.
 """
 
 import ctypes
@@ -32,7 +40,7 @@ OPEN_JOINT_STIFFNESS = 0.3  # of joints that are open at first, over the median 
 MIN_MASS_RATIO = 0.01  # over the median mass
 RAMP_ITERATIONS = 1000  # iterations over which loads come on
 CHECK_INTERVAL = 500  # iterations between two checks
-MAX_ITERATIONS = 200_000
+MAX_ITERATIONS = 60_000
 COMPARED_INTERVALS = 4  # intervals that are compared with as many before
 STALL_RATIO = 0.93  # fall of the smallest unbalanced force above which it no longer falls
 STEADY_RATIO = 0.8  # growth of displacements over that of before above which it is steady
@@ -43,6 +51,21 @@ FIRST_NEWTON_FORCE = 0.03  # unbalanced force (over the loads) at which Newton's
 ROUNDING_FORCE = 1e-12  # unbalanced force (over the loads) that is rounding
 NEXT_NEWTON_RATIO = 0.4  # of the unbalanced force of the last trial
 MAX_NEWTON_CHANGE = 0.5  # of the largest displacement: how far Newton's method may go
+EXPLICIT_ITERATIONS = 3500  # before implicit steps
+SMALL_FORCE = 0.03  # unbalanced force (over the loads) from which implicit steps begin at once
+FIRST_TIME_STEP = 2.0  # of implicit steps, over the unbalanced force relative to the loads
+MAX_STEPS = 130  # implicit ones
+MAX_STEPS_OF_DOUBLING = 50  # implicit ones that do not double the pseudo-time
+MAX_MODEL_ERROR = 20.0  # of the unbalanced force after a step, over the one before it
+TIME_STEP_DECREASE = 4.0  # after a larger error
+TIME_STEP_GROWTH = ((1.0, 3.0), (3.0, 1.5), (10.0, 1.0), (np.inf, 0.5))  # up to a model error
+SMOOTHING_ITERATIONS = 100
+SMOOTHING_DAMPING = 1.0  # critical for a frequency of half the highest: prevents flutter
+NEWTON_FORCE = 1e-6  # unbalanced force (over the loads) from which Newton's method ends the search
+DOUBLING = 2.0  # of the pseudo-time, after which unbalanced force and growth are compared
+MIN_DOUBLING_GROWTH = 0.2  # of the largest displacement, in a doubling of the pseudo-time
+STEADY_DOUBLING_RATIO = 1.5  # of the growth over that in the doubling before: 2 at constant speed
+DOUBLING_STALL_RATIO = 0.7  # of smallest unbalanced forces; an exponential decay stays below both
 UNSTABLE_FRACTION = 0.01  # of the fastest block: slower ones are not unstable
 ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int)  # as in layout.h
 
@@ -253,8 +276,11 @@ class Relaxation:
         size = np.abs(self.kinematics)
         row_sum = size.sum(axis=2)  # (k, dim): over the motions of both blocks
         mass = np.zeros_like(y)
+        row_stiffness = (stiffness * self.area)[:, None] * row_sum
         for block, part in ((a, size[:, :, :dof]), (b, size[:, :, dof:])):
-            np.add.at(mass, block, np.einsum("k,kc,kcm->km", stiffness * self.area, row_sum, part))
+            for motion in range(dof):
+                of_point = (row_stiffness * part[:, :, motion]).sum(axis=1)
+                mass[:, motion] += np.bincount(block, of_point, len(mass))
         is_heavy = (self.is_free > 0) & (mass > 0)
         if is_heavy.any():
             mass = np.maximum(mass, MIN_MASS_RATIO * np.median(mass[is_heavy]))
@@ -265,26 +291,46 @@ class Relaxation:
         self.is_free[blocks] = 0.0
         self.load *= self.is_free
 
-    def relax(self, y: np.ndarray, finish: Callable[[np.ndarray], np.ndarray | None]) -> Relaxed:
+    def relax(
+        self,
+        y: np.ndarray,
+        finish: Callable[[np.ndarray], np.ndarray | None],
+        implicit_step: Callable[[np.ndarray, np.ndarray], np.ndarray | None] | None = None,
+    ) -> Relaxed:
         """Search for the equilibrium by dynamic relaxation from displacements y (n, dof).
 
-        Iterations of the compiled relaxation continue until Newton's method converges nearby, the
-        unbalanced force is rounding, the blocks move steadily, or MAX_ITERATIONS is reached; masses
-        grow where the iteration diverges.
+        Iterations of the compiled relaxation bring the loads on, implicit steps continue. Where
+        these do not decide, iterations go on until Newton's method converges nearby, the unbalanced
+        force is rounding, the blocks move steadily, or MAX_ITERATIONS is reached; masses grow where
+        the iteration diverges.
 
         finish: Newton's method; returns the equilibrium that it finds near displacements, or None.
+        implicit_step: solves (K + drag) step = unbalanced force at displacements (n, dof) for a
+        drag (n, dof), None without a solution; without this function there are iterations alone.
 
         Returns the displacements, the growth of those that move, the verdict, the number of
         iterations and the smallest unbalanced force.
         """
-        none = np.zeros_like(y)
         self.first_force[:] = self.unbalanced(y)
         first_size = float(np.linalg.norm(self.first_force)) / self.scale
-        if first_size < FIRST_NEWTON_FORCE and (solution := finish(y)) is not None:
-            return Relaxed(solution, none, Verdict.EQUILIBRIUM, 0, first_size)
+        self.arrays.smallest_damping = 0.0
+        self.arrays.largest_force = DIVERGENCE_RATIO * self.scale * max(1.0, first_size)
+        if first_size < SMALL_FORCE:
+            if (solution := finish(y)) is not None:
+                none = np.zeros_like(y)
+                return Relaxed(solution, none, Verdict.EQUILIBRIUM, 0, first_size)
+            self.mass[:] = self.masses(y)
+            self.arrays.done = RAMP_ITERATIONS  # all loads act
+            if implicit_step and (relaxed := self._continue(y, finish, implicit_step)):
+                return relaxed
+            implicit_step = None
         self.mass[:] = self.masses(y)
         self.arrays.done = 0
-        self.arrays.largest_force = DIVERGENCE_RATIO * self.scale * max(1.0, first_size)
+        return self._iterate(y, finish, implicit_step)
+
+    def _iterate(self, y: np.ndarray, finish: Any, implicit_step: Any) -> Relaxed:
+        """Iterations and, after EXPLICIT_ITERATIONS, implicit steps: see `relax`."""
+        none = np.zeros_like(y)
         self._restart(y)
         best, smallest, newton_at = y.copy(), np.inf, FIRST_NEWTON_FORCE
         sizes: list[float] = []
@@ -303,13 +349,18 @@ class Relaxation:
             size = self.arrays.smallest_force / self.scale
             if size < smallest:
                 best, smallest = now, size
-            if size < newton_at:
+            if size < newton_at and (not implicit_step or size < NEWTON_FORCE):
                 solution = finish(now)
                 if solution is not None and self._is_near(solution, now):
                     return Relaxed(solution, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
                 newton_at = NEXT_NEWTON_RATIO * size
             if size < ROUNDING_FORCE:
                 return Relaxed(now, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
+            if implicit_step and self.arrays.done >= EXPLICIT_ITERATIONS:
+                if relaxed := self._continue(now, finish, implicit_step):
+                    return relaxed
+                implicit_step = None
+                self._restart(now)
             sizes.append(size)
             places.append(now)
             growth = _steady_growth(sizes, places)
@@ -317,6 +368,55 @@ class Relaxation:
                 return Relaxed(now, growth, Verdict.NO_EQUILIBRIUM, self.arrays.done, size)
         growth = places[-1] - places[max(-1 - COMPARED_INTERVALS, -len(places))] if places else none
         return Relaxed(self.y.copy(), growth, Verdict.NOT_DECIDED, self.arrays.done, smallest)
+
+    def _continue(self, y: np.ndarray, finish: Any, implicit_step: Any) -> Relaxed | None:
+        """Implicit steps of an overdamped motion from displacements y (n, dof), each followed by
+        smoothing iterations; None where they decide nothing. See `relax`."""
+        force = self.unbalanced(y)
+        size = float(np.linalg.norm(force)) / self.scale
+        time_step = FIRST_TIME_STEP / max(size, ROUNDING_FORCE)
+        history = _History(y, size)
+        newton_at = NEWTON_FORCE
+        for _ in range(MAX_STEPS):
+            if history.steps > MAX_STEPS_OF_DOUBLING:
+                return None
+            history.steps += 1
+            drag = self.mass / time_step
+            step = implicit_step(y, drag)
+            error = np.inf
+            if step is not None:
+                force_after = self.unbalanced(y + step)
+                error = float(np.linalg.norm(force_after - drag * step)) / (self.scale * size)
+            if not error <= MAX_MODEL_ERROR:  # also no number
+                time_step /= TIME_STEP_DECREASE
+                continue
+            y = y + step
+            size = float(np.linalg.norm(force_after)) / self.scale
+            if size < newton_at:
+                if (solution := finish(y)) is not None:
+                    none = np.zeros_like(y)
+                    return Relaxed(solution, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
+                newton_at = NEXT_NEWTON_RATIO * size
+            if size > NEWTON_FORCE:
+                y, size = self._smooth(y)
+            growth = history.steady_growth(time_step, y, size)
+            if growth is not None:
+                return Relaxed(y, growth, Verdict.NO_EQUILIBRIUM, self.arrays.done, size)
+            time_step *= next(factor for limit, factor in TIME_STEP_GROWTH if error <= limit)
+        return None
+
+    def _smooth(self, y: np.ndarray) -> tuple[np.ndarray, float]:
+        """Displacements after overdamped iterations from y (n, dof), and the unbalanced force over
+        the loads there. Masses grow where the iterations diverge, and y stays as it is."""
+        self.arrays.smallest_damping = SMOOTHING_DAMPING
+        self._restart(y)
+        has_diverged = self._call("relax", SMOOTHING_ITERATIONS)
+        self.arrays.smallest_damping = 0.0
+        if has_diverged:
+            self.mass *= MASS_INCREASE
+        smoothed = y if has_diverged else self.y.copy()
+        self.mass[:] = np.maximum(self.mass, self.masses(smoothed))
+        return smoothed, float(np.linalg.norm(self.unbalanced(smoothed))) / self.scale
 
     def _is_near(self, solution: np.ndarray, y: np.ndarray) -> bool:
         """Whether Newton's method ended near the displacements that it started from."""
@@ -335,6 +435,41 @@ class Relaxation:
         self.previous_force[:] = self.force
         self.previous_y[:] = y
         self.arrays.damping = 0.0
+
+
+class _History:
+    """Pseudo-time, displacements y (n, dof) and smallest unbalanced force of implicit steps, at
+    each doubling of the pseudo-time; steps since the last one."""
+
+    def __init__(self, y: np.ndarray, size: float) -> None:
+        self.steps = 0
+        self.time = 0.0
+        self.compared_at = 0.0
+        self.y = y
+        self.smallest = np.inf
+        self.previous_smallest = size
+        self.previous_growth = np.inf
+
+    def steady_growth(self, time_step: float, y: np.ndarray, size: float) -> np.ndarray | None:
+        """Growth (n, dof) of the displacements in the last doubling of the pseudo-time, if blocks
+        move steadily; None unless the smallest unbalanced force has hardly fallen, and the
+        displacements grow by a large share and at an almost constant speed."""
+        self.time += time_step
+        self.smallest = min(self.smallest, size)
+        if self.time < DOUBLING * self.compared_at:
+            return None
+        growth = y - self.y
+        fastest = float(np.abs(growth).max())
+        stalls = self.smallest > DOUBLING_STALL_RATIO * self.previous_smallest
+        grows = fastest > MIN_DOUBLING_GROWTH * np.abs(y).max()
+        is_steady = fastest > STEADY_DOUBLING_RATIO * self.previous_growth
+        self.steps = 0
+        self.compared_at = self.time
+        self.y = y
+        self.previous_smallest = self.smallest
+        self.smallest = np.inf
+        self.previous_growth = fastest
+        return growth if stalls and grows and is_steady else None
 
 
 def _steady_growth(sizes: list[float], places: list[np.ndarray]) -> np.ndarray | None:

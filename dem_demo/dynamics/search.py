@@ -22,9 +22,9 @@ from functools import partial, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import bmat, csc_array, csr_array, diags, vstack
+from scipy.sparse import csc_array, csr_array, vstack
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu, spsolve
 
 from .bolts import StaticBolts
 from .relaxation import UNSTABLE_FRACTION, Relaxation, Verdict
@@ -39,6 +39,8 @@ DAMPING_INCREASE = 4.0
 DAMPING_DECREASE = 10.0
 MIN_DAMPING = 1e-3  # of the largest stiffness
 REGULARISATION = 1e-9  # of the least damping, so that free blocks give no singular matrix
+
+ORDERING = "MMD_AT_PLUS_A"  # of the unknowns, for a structure that is symmetric
 
 # Relaxation
 RELEASE_CLOSURES = 10.0  # largest closures by which an unstable block may move from its place
@@ -108,10 +110,47 @@ def vector_length(columns: np.ndarray) -> np.ndarray:
 
 
 class Stiffness(NamedTuple):
-    """Tangent stiffness of joints (dim k, dim k) in Pa/m, and of bolts (b,) in N/m."""
+    """Tangent stiffness of joints (k, dim, dim) in Pa/m, and of bolts (b,) in N/m."""
 
-    joints: csr_array
+    joints: np.ndarray
     bolts: np.ndarray
+
+
+class StiffnessPattern:
+    """Places of the entries of a stiffness matrix (m, m), which stay the same in a search.
+
+    Each element couples the motions of two blocks; columns (elements, 2 dof): number of each of
+    their motions among the m free ones, -1 for a prescribed one.
+    """
+
+    def __init__(self, columns: np.ndarray, m: int) -> None:
+        row = columns[:, :, None]
+        column = columns[:, None, :]
+        code = np.where((row >= 0) & (column >= 0), column * m + row, m * m).ravel()
+        diagonal = np.arange(m) * (m + 1)
+        codes, place = np.unique(np.concatenate([code, diagonal, [m * m]]), return_inverse=True)
+        self.m = m
+        self.place = place[: len(code)]
+        self.diagonal = place[len(code) : -1]
+        self.count = len(codes) - 1  # the last one collects the entries of prescribed motions
+        column_of_entry, row_of_entry = np.divmod(codes[:-1], max(m, 1))
+        self.rows = row_of_entry.astype(np.int32)
+        self.starts = np.searchsorted(column_of_entry, np.arange(m + 1)).astype(np.int32)
+
+    def matrix(self, elements: np.ndarray) -> csc_array:
+        """The sum of the stiffness (elements, 2 dof, 2 dof) of all elements; it has an entry for
+        every place of the diagonal."""
+        entries = np.bincount(self.place, elements.ravel(), self.count + 1)[:-1].astype(float)
+        return csc_array((entries, self.rows, self.starts), shape=(self.m, self.m))
+
+    def with_diagonal(self, matrix: csc_array, diagonal: np.ndarray) -> csc_array:
+        """A copy of a matrix of this pattern with a diagonal (m,) added, ready to be factorised:
+        without the zeros of open contacts, which would fill in."""
+        entries = matrix.data.copy()
+        entries[self.diagonal] += diagonal
+        copy = csc_array((entries, self.rows.copy(), self.starts.copy()), shape=matrix.shape)
+        copy.eliminate_zeros()
+        return copy
 
 
 class Solution(NamedTuple):
@@ -155,6 +194,12 @@ class EquilibriumSearch:
         self.zero = np.zeros(len(self.block))
         touched = sum(abs(self.kinematics[i * self.k : (i + 1) * self.k]) for i in range(self.dim))
         touched = vstack([touched, abs(self.bolt_kinematics)])
+        number = np.full(system.is_free.shape, -1)
+        number[system.is_free] = np.arange(len(self.block))
+        block_a = np.concatenate([system.block_a, bolts.block_a]).astype(int)
+        block_b = np.concatenate([system.block_b, bolts.block_b]).astype(int)
+        columns = np.concatenate([number[block_a], number[block_b]], axis=1)
+        self.pattern = StiffnessPattern(columns, len(self.block))
         self.island = connected_components(touched.T @ touched, directed=False)[1]
 
     def expand(self, values: np.ndarray) -> np.ndarray:
@@ -180,7 +225,11 @@ class EquilibriumSearch:
         y = start
         while True:
             is_fixed = unstable[self.block]
-            relaxed = relaxation.relax(self.expand(y), partial(self._finish, is_fixed))
+            relaxed = relaxation.relax(
+                self.expand(y),
+                partial(self._finish, is_fixed),
+                partial(self._implicit_step, is_fixed),
+            )
             displacement = relaxed.y[self.system.is_free]
             if relaxed.verdict is Verdict.EQUILIBRIUM:
                 if (is_released := unstable & ~known_unstable).any():
@@ -232,6 +281,24 @@ class EquilibriumSearch:
             start, FIXING_DRAG * is_fixed, max_iterations=MAX_FINISHING_ITERATIONS
         )
         return self.expand(displacement) if converged.all() else None
+
+    def _implicit_step(
+        self, is_fixed: np.ndarray, y: np.ndarray, drag: np.ndarray
+    ) -> np.ndarray | None:
+        """One implicit step (n, dof) from displacements y (n, dof) through a drag (n, dof): the
+        solution of (K + drag) step = unbalanced force, None where the matrix is singular.
+
+        is_fixed (m,): motions that stay.
+        """
+        is_free = self.system.is_free
+        unbalanced, stiffness = self._unbalanced(y[is_free])
+        diagonal = drag[is_free] + FIXING_DRAG * is_fixed
+        matrix = self.pattern.with_diagonal(self._assemble_stiffness(stiffness), diagonal)
+        try:
+            factors = splu(matrix, permc_spec=ORDERING)
+        except RuntimeError:
+            return None
+        return self.expand(factors.solve(unbalanced * ~is_fixed))
 
     def _distance(self, displacement: np.ndarray) -> np.ndarray:
         """Largest displacement (n,) in m of each block at scaled displacements (n, dof)."""
@@ -290,9 +357,13 @@ class EquilibriumSearch:
 
     def _assemble_stiffness(self, stiffness: Stiffness) -> csc_array:
         """Stiffness (m, m) of the blocks from the stiffness of joints and bolts."""
-        of_joints = self.kinematics.T @ (diags(self.area) @ stiffness.joints) @ self.kinematics
-        of_bolts = self.bolt_kinematics.T @ diags(stiffness.bolts) @ self.bolt_kinematics
-        return (of_joints + of_bolts).tocsc()
+        k = self.k
+        rows = self.system.kinematics
+        weighted = np.einsum("kcd,kdj->kcj", self.area[:k, None, None] * stiffness.joints, rows)
+        of_joints = np.einsum("kci,kcj->kij", rows, weighted)
+        rates = self.bolts.kinematics
+        of_bolts = stiffness.bolts[:, None, None] * rates[:, :, None] * rates[:, None, :]
+        return self.pattern.matrix(np.concatenate([of_joints, of_bolts]))
 
     def stick_predictor(self) -> np.ndarray:
         """First guess (m,): displacements if no joint can slide.
@@ -328,13 +399,11 @@ class EquilibriumSearch:
             F, C, _ = self.joints.trial(d)
         else:
             F, C = self.joints.stick_predictor(d)
-        parts = range(self.dim)
-        joint_stiffness = csr_array(bmat([[diags(C[:, i, j]) for j in parts] for i in parts]))
         joint_forces = self.kinematics.T @ (self.area * F.T.ravel())
         tension, bolt_stiffness = self.bolts.tension(self.bolt_kinematics @ y)
         bolt_forces = self.bolt_kinematics.T @ tension
         unbalanced = self.force - joint_forces - bolt_forces
-        return unbalanced, Stiffness(joint_stiffness, bolt_stiffness)
+        return unbalanced, Stiffness(C, bolt_stiffness)
 
     def _step(
         self,
@@ -375,7 +444,7 @@ class EquilibriumSearch:
             step = self.zero
             for _ in range(MAX_DAMPINGS):
                 diagonal = drag + damping[island] + REGULARISATION * min_damping
-                solution = spsolve((K + diags(diagonal)).tocsc(), residual)
+                solution = spsolve(self.pattern.with_diagonal(K, diagonal), residual, ORDERING)
                 step = np.where(needs_damping[island], solution, step)
                 trial = evaluate(y + step * is_active[island])
                 needs_damping = is_active & ~(trial[-1] < size)

@@ -205,6 +205,7 @@ RELAXATION = {
     "previous_y": Field("double *", "(n, dof): when the damping was last adapted"),
     "previous_force": Field("double *", "(n, dof): when the damping was last adapted"),
     "damping": Field("double", "c"),
+    "smallest_damping": Field("double", "lower bound of c"),
     "smallest_force": Field("double", "norm of the unbalanced force, smallest of a call"),
     "largest_force": Field("double", "norm above which the iterations have diverged"),
     "done": Field("long long", "iterations"),

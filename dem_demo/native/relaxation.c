@@ -165,7 +165,7 @@ EXPORT int dem_relax(dem_relaxation *p, long long count)
   for (long long t = 0; t < count; t++) {
     if (t % ADAPT_INTERVAL == 0) {
       double size;
-      p->damping = DAMPING_FACTOR * lowest_frequency(p, &size);
+      p->damping = fmax(DAMPING_FACTOR * lowest_frequency(p, &size), p->smallest_damping);
       if (size < p->smallest_force) p->smallest_force = size;
       if (!(size <= p->largest_force)) return 1;
     }

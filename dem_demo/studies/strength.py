@@ -9,7 +9,7 @@ shorter steps where none is found.
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from jointlaw.support.files import write_json
 
-from ..dynamics.equilibrium import equilibrium_displacements
+from ..dynamics.equilibrium import equilibrium_displacements, stick_displacements
 from ..dynamics.simulation import Simulation
 from ..output.folder import TRIALS
 from ..output.pictures import Pictures
@@ -212,9 +212,16 @@ def factor_of_safety(
     if bound == 0.0:
         return None
 
+    @cache
+    def sticking() -> np.ndarray:
+        """Guess of trials that have no other: joints that cannot slide have the same stiffness
+        with every strength."""
+        return stick_displacements(scene, is_excluded)
+
     def solve(log_factor: float, guess: np.ndarray | None) -> np.ndarray | None:
         reduced = weakened(scene, float(np.exp(log_factor)))
-        return equilibrium_displacements(reduced, guess, is_excluded)
+        start = sticking() if guess is None else guess
+        return equilibrium_displacements(reduced, start, is_excluded)
 
     with LimitSearch(solve, trials, f"{name}: factor of safety") as search:
         if bound is None:

@@ -431,7 +431,7 @@ static JLAW_FUNCTION int jlaw_list_state_parts_(const jlaw_law *law, jl_rows par
   const jl_rows asperities[8] = {
       {"delta", 0, law->dim, 0, 0, -delta, delta},
       {"dissipated_energy", law->dim, 1, 0, 0, -DBL_MAX, DBL_MAX},
-      {"q", jl_slider_row(law), 2 * M * D, 0, 0, -DBL_MAX, DBL_MAX},
+      {"q", jl_slider_row(law), JL_NUMBERS_PER_SLIDER * M * D, 0, 0, -DBL_MAX, DBL_MAX},
       {"indentation", jl_plastic_row(law), law->yields * M, 0, 0, 0.0, law->max_effective_closure},
       {"plastic_work", jl_plastic_row(law) + M, law->yields, 0, 0, -DBL_MAX, DBL_MAX},
       {"lost_slopes", jl_degradation_row(law), jl_slopes_change(law), 0, 0, 0.0, 1.0},
@@ -470,8 +470,12 @@ static JLAW_FUNCTION void jlaw_report_state_(const jlaw_law *law, const double *
     }
   /* each number is within its bounds: a sum of them is not */
   if (!jlaw_sliders_are_valid_(s + jl_slider_row(law), jl_plastic_row(law) - jl_slider_row(law))) {
+#ifdef JLAW_FLOAT_SLIDERS
+    jlaw_append_(text, "q of the state has a float that is not finite");
+#else
     jlaw_append_(text, "q of the state has a sum of squares above ");
     jlaw_append_number_(text, JLAW_MAX_SLIDER_SQUARES);
+#endif
   } else jlaw_append_(text, "delta of the state is too large");
 }
 

@@ -141,7 +141,7 @@ def test_what_does_not_fit_is_refused(lib, tmp_path):
         for bad in (np.nan, np.inf, -np.inf):
             one.state[:] = before
             one.state.view(np.float32)[2 * (law.dim + 1) + half] = bad
-            with pytest.raises(ValueError, match="the state has numbers that are not finite"):
+            with pytest.raises(ValueError, match="q of the state has a float that is not finite"):
                 one.step(np.full(3, 1e-8))
 
 

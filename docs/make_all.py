@@ -93,6 +93,8 @@ PARTS = {
     # water.md, blocks.md
     "mean-gap": Part("docs/measure/aperture.py mean-gap", page="water.md"),
     "slide-flow": Part("docs/measure/aperture.py slide", quoted_in="water.md blocks.md"),
+    # files of data: the command writes them itself
+    "synthetic-shear": Part("docs/measure/synthetic_shear.py", quoted_in="tutorial-calibrate.md"),
     # pictures
     "moving": Part("docs/draw/moving.py FOLDER", pictures={"moving.gif": "moving.gif"}),
     "why": Part(

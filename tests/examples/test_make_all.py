@@ -59,7 +59,7 @@ def test_every_mark_of_a_page_is_filled_by_a_part():
     marks = {
         mark
         for page in PAGES
-        for mark in re.findall(r"<!-- end of ([\w-]+) -->", page.read_text(encoding="utf-8"))
+        for mark in re.findall(r"\|\n<!-- end of ([\w-]+) -->", page.read_text(encoding="utf-8"))
     }
     assert marks == {name for name, part in PARTS.items() if part.page}
 

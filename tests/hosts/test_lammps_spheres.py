@@ -147,7 +147,7 @@ RESTARTED = (
 read_restart held
 plugin load ./jointlawplugin.so
 pair_style jointlaw opening 1e-3 damping 0.1
-pair_coeff * * {law}.jlaw
+pair_coeff * * rock.jlaw
 neighbor 0.002 bin
 timestep 4e-7
 fix 1 all nve/sphere

@@ -1,5 +1,6 @@
 """From tests to a law: fits of closure and shear curves, alone or together, and their report."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import compress, count
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..laws.joint_law import JointLaw
+from ..laws.joint_law import JammingWarning, JointLaw
 from ..support.checks import Array
 from ..support.markdown import table
 from ..support.progress import track
@@ -19,7 +20,7 @@ from .forward import DEFAULT_STIFFNESS, DEFAULT_STIFFNESS_STRESS, log_stress
 from .meaning import describe
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
-from .problem import build_problem, solve, staged_starts, starting_points
+from .problem import Problem, build_problem, solve, staged_starts, starting_points
 
 MAX_DISCRETISATION_ERROR = 0.005  # of the largest stress or opening, with half the step
 MAX_REFINEMENTS = 8  # doublings of the number of steps
@@ -363,9 +364,16 @@ def fit_curves(
     >>> curve = jl.ShearCurve(sheared.shear, sheared.shear_stress, normal=5e6)
     >>> fit = jl.fit_curves([curve], free=["mu"], law=law)
     """
-    problem = build_problem(curves, free, fixed, law, priors, one_specimen)
+    with warnings.catch_warnings():  # of laws that are only tried; the fitted law warns for itself
+        warnings.simplefilter("ignore", JammingWarning)
+        problem = build_problem(curves, free, fixed, law, priors, one_specimen)
+        return _fit(problem, has_law=law is not None)
+
+
+def _fit(problem: Problem, has_law: bool) -> Fit:
+    """Solve a problem, with finer steps until they no longer change its curves."""
     problem = replace(problem, progress=iter(track(count(), "fit, laws tried")))
-    starts = staged_starts(problem, starting_points(problem, has_law=law is not None))
+    starts = staged_starts(problem, starting_points(problem, has_law=has_law))
     solution = solve(problem, starts)
     for _ in range(MAX_REFINEMENTS):
         steps = 2 * problem.settings.steps

@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 MIN_MATING_LENGTH = 0.1
 
 
+class JammingWarning(UserWarning):
+    """Facets of a law are so steep that they jam, and a joint that opens may bear tension."""
+
+
 @declared
 @dataclass(frozen=True, kw_only=True)
 class JointLaw(Law, kind="joint"):
@@ -176,6 +180,7 @@ class JointLaw(Law, kind="joint"):
             f"atan(mu) + 90/a = {friction_angle + steepest:.4g} degrees is more than 90, so that "
             "sheared facets jam, and a joint that opens may bear tension without a bond "
             "(docs/limits.md). Lower mu or raise a unless this is intended",
+            JammingWarning,
             stacklevel=4,
         )
 

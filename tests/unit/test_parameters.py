@@ -208,3 +208,19 @@ def test_a_law_whose_facets_jam_warns():
         kinds.make_law(**steep | {"plane": None}, closure_only=True)
         for name in jl.presets.names():
             jl.presets.load(name)
+
+
+def test_a_fit_is_silent_about_laws_that_it_only_tries():
+    """It starts at a law whose facets jam, and finds one whose facets do not."""
+    law = kinds.make_law(plane=0.0)
+    record = jl.direct_shear(law.joint(), 2 * law.closure(1e6), 1e6, steps=30)
+    curve = jl.ShearCurve(record.shear[::6], record.shear_stress[::6], 1e6)
+    steepness = 1.01 * np.degrees(np.pi / 2 - np.arctan(law.asperity.mu))
+    with pytest.warns(UserWarning, match="jam"):
+        steep = dataclasses.replace(
+            law, orientation=dataclasses.replace(law.orientation, a=90.0 / steepness)
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit = jl.fit_curves([curve], free=("a",), law=steep)
+        assert fit.law.orientation.a == pytest.approx(law.orientation.a, rel=0.02)

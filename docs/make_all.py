@@ -176,6 +176,7 @@ PARTS = {
     ),
     "blocks-cost": Part("docs/measure/blocks.py step-cost", page="blocks.md", is_timed=True),
     "space-cost": Part("docs/measure/space.py cost", page="space.md", is_timed=True),
+    "space-step-cost": Part("docs/measure/space.py step-cost", page="space.md", is_timed=True),
     "heap": Part("docs/measure/blocks.py heap FOLDER", quoted_in="blocks.md", is_timed=True),
     "yade": Part("docs/measure/hosts.py yade", page="particles.md", is_timed=True),
     "lammps": Part("docs/measure/hosts.py lammps FOLDER", page="particles.md", is_timed=True),

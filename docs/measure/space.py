@@ -1,7 +1,8 @@
-"""Blocks in space: factor of safety by rough direction, and what cutting and statics cost.
+"""Blocks in space: factor of safety by rough direction, and costs of cutting, statics and motion.
 
 python docs/measure/space.py rough-direction
 python docs/measure/space.py cost
+python docs/measure/space.py step-cost
 """
 
 import os
@@ -15,7 +16,7 @@ from common import print_table, run_command
 
 from dem_demo.scene import read_tables
 from dem_demo.scene.read import read_source
-from dem_demo.space import Statics, load
+from dem_demo.space import SpaceSimulation, Statics, load, parse
 from dem_demo.space.contacts import Surfaces, find_contacts
 from dem_demo.space.cutting import PlaneSet, cut_rock
 from dem_demo.space.read import build
@@ -78,5 +79,68 @@ def cost() -> None:
     print_table(["", "CPU time, one thread"], rows)
 
 
+COULOMB = """\
+kind = "coulomb"
+normal_stiffness = 2e9
+shear_stiffness = 1e9
+friction = 0.6
+"""
+ROUGH = """\
+asperity_density = 1e4
+closure_range = 2e-4
+mating_length = 2e-3
+orientation = { a = 3.0, b = -1.0, c = 0.3 }
+asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
+heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+"""
+LAWS = {
+    "Coulomb": COULOMB,
+    "`fast`": ROUGH + 'resolution = "fast"\n',
+    "`balanced`": ROUGH + 'resolution = "balanced"\n',
+}
+WALLS = [(5, 6), (17, 18), (32, 32), (100, 101)]  # bricks of the longest row, and rows
+LARGEST = 300  # bricks of a wall that starts at rest, and of one of rough joints
+WARM_UP = 20  # steps
+
+
+def wall(wide: int, high: int, law: str) -> SpaceSimulation:
+    """A dry wall of bricks in half-brick bond, at rest up to `LARGEST` bricks; larger ones have not
+    settled yet under their weight."""
+    base = f"box = [{0.6 * wide + 2}, 2.0, 0.5]\nat = [{0.3 * wide}, 0.0, -0.25]\nfixed = true\n"
+    parts = [f'rough = 0.0\n[laws.joint]\n{law}[[block]]\nname = "ground"\n{base}']
+    for row in range(high):
+        for i in range(wide - row % 2):
+            at = [0.6 * i + 0.3 + 0.3 * (row % 2), 0.0, 0.3 * row + 0.15]
+            parts.append(f'[[block]]\nname = "{row} {i}"\nbox = [0.6, 0.3, 0.3]\nat = {at}\n')
+    settle = str(wide * high - high // 2 <= LARGEST).lower()
+    return SpaceSimulation(parse("".join(parts) + f"[run]\nend = 1.0\nsettle = {settle}\n"))
+
+
+def step_cost() -> None:
+    """Print the CPU time of a step of walls, and of one of its contact points."""
+    rows = []
+    for wide, high in WALLS:
+        bricks = wide * high - high // 2
+        of_step, of_point = [], []
+        for law in LAWS.values():
+            if bricks > LARGEST and law is not COULOMB:
+                of_step.append("")
+                of_point.append("")
+                continue
+            sim = wall(wide, high, law)
+            steps = max(10, 20000 // bricks)
+            for _ in range(WARM_UP):
+                sim.step()
+            start = time.process_time()
+            for _ in range(steps):
+                sim.step()
+            spent = (time.process_time() - start) / steps
+            of_step.append(f"{1e3 * spent:.2g}")
+            of_point.append(f"{1e6 * spent / sim.joints.n:.2g}")
+        rows.append([bricks, sim.joints.n, *of_step, *of_point])
+    head = [*(f"{name}, ms a step" for name in LAWS), *(f"{name}, µs a point" for name in LAWS)]
+    print_table(["bricks", "contact points", *head], rows)
+
+
 if __name__ == "__main__":
-    run_command(__doc__, rough_direction, cost)
+    run_command(__doc__, rough_direction, cost, step_cost)

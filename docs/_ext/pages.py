@@ -65,7 +65,7 @@ def describe_thumbnails(app, doctree):
     for image in doctree.findall(nodes.image):
         script = re.search(r"sphx_glr_(plot_\w+)_thumb", image["uri"])
         if script and not image.get("alt"):
-            (path,) = ROOT.glob(f"docs/*/{script[1]}.py")
+            path = next(ROOT.glob(f"docs/*/{script[1]}.py"))  # the gallery copies its scripts
             text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
             image["alt"] = f"Thumbnail: {text.splitlines()[0].strip('= ')}"
 

@@ -41,6 +41,8 @@ AS_AT_STEP_0 = {
     "unstable",
     "verdict",
 }
+# No scene of this module reaches them: polygons that are found between two rebuilds
+NOT_REACHED = {"contacts.area_gradient", "contacts.found_at", "contacts.plane_is_of_a"}
 NO_STATE = {"joints.place"}  # where in its pool a joint lies; its state is compared
 BASE = block("base", box=[4.0, 1.0], at=[0.5, -0.5], fixed=True)
 ONE = block("one", box=[1.0, 0.5], at=[0.0, 0.25])
@@ -223,7 +225,8 @@ def entries():
     yield from ((Simulation, name) for name in in_plane)
     yield from ((Simulation, f"states-1: {name}") for name in tables.row_counts)
     in_space = new_simulation(parse(SLIDING)).state()
-    yield from ((SpaceSimulation, name) for name in in_space if name not in in_plane)
+    others = [name for name in in_space if name not in in_plane and name not in NOT_REACHED]
+    yield from ((SpaceSimulation, name) for name in others)
 
 
 def left_out(name, sim):

@@ -109,7 +109,10 @@ PARTS = {
     ),
     "space": Part(
         "docs/draw/space.py FOLDER",
-        pictures={name: name for name in ("wedge.png", "slope-3d-joints.png", "face-contact.png")},
+        pictures={
+            name: name
+            for name in ("wedge.png", "slope-3d-joints.png", "face-contact.png", "veering.png")
+        },
     ),
     "wedge-across": Part(
         "-m dem_demo wedge-across --out FOLDER", pictures={"wedge.gif": "motion.gif"}

@@ -52,6 +52,7 @@ HIGH_STRESS = 2e7  # Pa: bounds the stiffness of joints where nothing touches at
 FIXING_DRAG = 1e25  # 1/s2: holds a block in its place
 PREDICTOR_FALL = 0.1  # of its radius: fall of a free block in the stick predictor
 MIN_RELEASE = 1e-6  # m: an unstable block may move as far in any case
+MAX_SHIFT = 0.05  # of the smaller radius: relative displacement of two blocks at a contact point
 
 
 class StaticSystem(NamedTuple):
@@ -184,6 +185,8 @@ class EquilibriumSearch:
             bolts.block_a, bolts.block_b, bolts.kinematics[:, None, :], system.is_free
         )
         self.area = np.tile(system.area, self.dim)
+        radius = np.minimum(system.radius[system.block_a], system.radius[system.block_b])
+        self.max_shift = MAX_SHIFT * radius
         self.start = system.start.T.ravel()
         self.root = system.scale[system.is_free]
         self.block = np.nonzero(system.is_free)[0]  # of each free motion
@@ -229,6 +232,7 @@ class EquilibriumSearch:
                 self.expand(y),
                 partial(self._finish, is_fixed),
                 partial(self._implicit_step, is_fixed),
+                self._is_far,
             )
             displacement = relaxed.y[self.system.is_free]
             if relaxed.verdict is Verdict.EQUILIBRIUM:
@@ -280,7 +284,14 @@ class EquilibriumSearch:
         displacement, _, converged = self._step(
             start, FIXING_DRAG * is_fixed, max_iterations=MAX_FINISHING_ITERATIONS
         )
-        return self.expand(displacement) if converged.all() else None
+        y = self.expand(displacement)
+        return y if converged.all() and not self._is_far(y) else None
+
+    def _is_far(self, y: np.ndarray) -> bool:
+        """Whether two blocks have moved so far on each other at displacements y (n, dof) that their
+        contact does not hold there: contacts keep their places and normals in a search."""
+        shift = (self.kinematics @ y[self.system.is_free]).reshape(self.dim, -1)
+        return bool((vector_length(shift.T) > self.max_shift).any())
 
     def _implicit_step(
         self, is_fixed: np.ndarray, y: np.ndarray, drag: np.ndarray

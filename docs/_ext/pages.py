@@ -4,8 +4,6 @@ import ast
 import re
 from pathlib import Path
 
-from docutils import nodes
-
 ROOT = Path(__file__).parents[2]
 CITED = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 REPOSITORY = re.search(r'^repository-code: "(.+)"', CITED, re.MULTILINE)[1]
@@ -62,6 +60,8 @@ def read(app, name, source):
 
 def describe_thumbnails(app, doctree):
     """Give thumbnails of the gallery, which have no alternative text, the title of their page."""
+    from docutils import nodes  # comes with the extra `docs`, which tests of this file lack
+
     for image in doctree.findall(nodes.image):
         script = re.search(r"sphx_glr_(plot_\w+)_thumb", image["uri"])
         if script and not image.get("alt"):

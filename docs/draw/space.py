@@ -5,6 +5,7 @@
 wedge.png: the scenes wedge and wedge-across, their rough directions and factors of safety.
 slope-3d-joints.png: the scene slope-3d, its blocks pulled apart.
 face-contact.png: two faces that lie on each other, their overlap, and the points that carry it.
+veering.png: direction in which a block slides, whose dip line is oblique to the rough direction.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from command_line import output_folder
 from matplotlib import pyplot as plt
 from PIL import Image
 
-from dem_demo.space import Statics, load
+from dem_demo.space import SpaceSimulation, Statics, load, parse
 from dem_demo.space.contacts import Surfaces, find_contacts
 from dem_demo.space.drawing import Drawing
 from dem_demo.space.pictures import JOINTS_PULL, ROUGH_COLOUR, STATE_COLOURS, SpacePictures
@@ -73,8 +74,67 @@ def draw_contact(axes):
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, labelspacing=1.0)
 
 
+OBLIQUE_SCENE = """
+gravity = [{g[0]}, {g[1]}, {g[2]}]
+rough = -90.0
+[laws.rock]
+from = "jing-replica"
+orientation = {{ a = 3.0, b = -1.0, c = {c} }}
+mating_length = 2e-3
+closure_range = 2e-5
+[[block]]
+name = "bed"
+box = [8.0, 8.0, 1.0]
+at = [0.0, 0.0, -0.5]
+fixed = true
+[[block]]
+name = "slab"
+box = [1.0, 1.0, 0.02]
+at = [0.0, 0.0, 0.01]
+density = 26000.0
+[run]
+end = 0.25
+fraction = 0.15
+skin = 0.02
+max_overlap = 0.9
+"""
+SLOPE = np.radians(56.0)
+DIP_AZIMUTH = np.radians(45.0)  # from axis 2 of the law
+
+
+def slide_azimuths(anisotropy):
+    """Distance (mm) and azimuth (degrees) from axis 2 of a slab on its way down a slope."""
+    down = np.sin(SLOPE) * np.array([np.cos(DIP_AZIMUTH), np.sin(DIP_AZIMUTH)])
+    gravity = 9.81 * np.array([*down, -np.cos(SLOPE)])
+    sim = SpaceSimulation(parse(OBLIQUE_SCENE.format(g=gravity, c=anisotropy)))
+    start = sim.blocks.motion[:2, 1].copy()
+    path = []
+    while sim.time < 0.25:
+        sim.step()
+        path.append(sim.blocks.motion[:2, 1] - start)
+    x, y = np.array(path).T
+    return 1e3 * np.hypot(x, y), np.degrees(np.arctan2(y, x))
+
+
+def draw_veering(axes):
+    """Draw the direction of the way of a slab by the distance that it has slid."""
+    for anisotropy, text in (
+        (-0.3, "rougher across it"),
+        (0.0, "isotropic"),
+        (0.3, "rougher along it"),
+    ):
+        distance, azimuth = slide_azimuths(anisotropy)
+        seen = distance > 0.1
+        label = f"c = {anisotropy:g}, {text}"
+        axes.semilogx(distance[seen], azimuth[seen], label=label)
+    axes.axhline(45.0, color="0.6", linewidth=0.8, linestyle="--", label="dip line")
+    axes.set(xlabel="distance slid (mm)", ylabel="direction from axis 2 (degrees)")
+    axes.set_ylim(42.5, 48.0)
+    axes.legend(frameon=False, ncols=2, loc="upper center")
+
+
 def main() -> None:
-    """Draw both pictures into the folder of the command line."""
+    """Draw the pictures into the folder of the command line."""
     folder = output_folder(__doc__)
     with style():
         figure, pair = plt.subplots(1, 2, figsize=(11, 4.4))
@@ -85,6 +145,9 @@ def main() -> None:
         figure, axes = plt.subplots(figsize=(7, 3.4))
         draw_contact(axes)
         figure.savefig(folder / "face-contact.png", dpi=110, bbox_inches="tight")
+        figure, axes = plt.subplots(figsize=(6, 3.8), layout="constrained")
+        draw_veering(axes)
+        figure.savefig(folder / "veering.png", dpi=110)
 
 
 if __name__ == "__main__":

@@ -435,7 +435,7 @@ def degrade(
     delta: Array,
     old: AsperityState,
     slope_retention: Array,
-    tolerances: FrictionTolerances,
+    tolerances: FrictionTolerances = DOUBLE_TOLERANCES,
 ) -> tuple[Array, Array]:
     """Slider forces and dissipated energy after slopes decrease while the joint is at rest.
 

@@ -331,9 +331,7 @@ class Relaxation:
         self.arrays.done = 0
         return self._iterate(y, finish, implicit_step, is_far)
 
-    def _iterate(
-        self, y: np.ndarray, finish: Any, implicit_step: Any, is_far: Any
-    ) -> Relaxed:
+    def _iterate(self, y: np.ndarray, finish: Any, implicit_step: Any, is_far: Any) -> Relaxed:
         """Iterations and, after EXPLICIT_ITERATIONS, implicit steps: see `relax`."""
         none = np.zeros_like(y)
         self._restart(y)

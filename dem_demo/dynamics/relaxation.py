@@ -296,7 +296,6 @@ class Relaxation:
         y: np.ndarray,
         finish: Callable[[np.ndarray], np.ndarray | None],
         implicit_step: Callable[[np.ndarray, np.ndarray], np.ndarray | None] | None = None,
-        is_far: Callable[[np.ndarray], bool] = lambda _y: False,
     ) -> Relaxed:
         """Search for the equilibrium by dynamic relaxation from displacements y (n, dof).
 
@@ -308,8 +307,6 @@ class Relaxation:
         finish: Newton's method; returns the equilibrium that it finds near displacements, or None.
         implicit_step: solves (K + drag) step = unbalanced force at displacements (n, dof) for a
         drag (n, dof), None without a solution; without this function there are iterations alone.
-        is_far: whether blocks have moved so far at displacements (n, dof) that the contacts do not
-        hold there; a motion that comes there has found no equilibrium on its way.
 
         Returns the displacements, the growth of those that move, the verdict, the number of
         iterations and the smallest unbalanced force.
@@ -324,14 +321,14 @@ class Relaxation:
                 return Relaxed(solution, none, Verdict.EQUILIBRIUM, 0, first_size)
             self.mass[:] = self.masses(y)
             self.arrays.done = RAMP_ITERATIONS  # all loads act
-            if implicit_step and (relaxed := self._continue(y, finish, implicit_step, is_far)):
+            if implicit_step and (relaxed := self._continue(y, finish, implicit_step)):
                 return relaxed
             implicit_step = None
         self.mass[:] = self.masses(y)
         self.arrays.done = 0
-        return self._iterate(y, finish, implicit_step, is_far)
+        return self._iterate(y, finish, implicit_step)
 
-    def _iterate(self, y: np.ndarray, finish: Any, implicit_step: Any, is_far: Any) -> Relaxed:
+    def _iterate(self, y: np.ndarray, finish: Any, implicit_step: Any) -> Relaxed:
         """Iterations and, after EXPLICIT_ITERATIONS, implicit steps: see `relax`."""
         none = np.zeros_like(y)
         self._restart(y)
@@ -360,7 +357,7 @@ class Relaxation:
             if size < ROUNDING_FORCE:
                 return Relaxed(now, none, Verdict.EQUILIBRIUM, self.arrays.done, size)
             if implicit_step and self.arrays.done >= EXPLICIT_ITERATIONS:
-                if relaxed := self._continue(now, finish, implicit_step, is_far):
+                if relaxed := self._continue(now, finish, implicit_step):
                     return relaxed
                 implicit_step = None
                 self._restart(now)
@@ -372,9 +369,7 @@ class Relaxation:
         growth = places[-1] - places[max(-1 - COMPARED_INTERVALS, -len(places))] if places else none
         return Relaxed(self.y.copy(), growth, Verdict.NOT_DECIDED, self.arrays.done, smallest)
 
-    def _continue(
-        self, y: np.ndarray, finish: Any, implicit_step: Any, is_far: Any
-    ) -> Relaxed | None:
+    def _continue(self, y: np.ndarray, finish: Any, implicit_step: Any) -> Relaxed | None:
         """Implicit steps of an overdamped motion from displacements y (n, dof), each followed by
         smoothing iterations; None where they decide nothing. See `relax`."""
         force = self.unbalanced(y)
@@ -397,8 +392,6 @@ class Relaxation:
                 continue
             y = y + step
             size = float(np.linalg.norm(force_after)) / self.scale
-            if is_far(y):
-                return Relaxed(y, step, Verdict.NO_EQUILIBRIUM, self.arrays.done, size)
             if size < newton_at:
                 if (solution := finish(y)) is not None:
                     none = np.zeros_like(y)

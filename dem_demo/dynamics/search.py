@@ -232,7 +232,6 @@ class EquilibriumSearch:
                 self.expand(y),
                 partial(self._finish, is_fixed),
                 partial(self._implicit_step, is_fixed),
-                self._is_far,
             )
             displacement = relaxed.y[self.system.is_free]
             if relaxed.verdict is Verdict.EQUILIBRIUM:

@@ -386,7 +386,8 @@ class Relaxation:
             error = np.inf
             if step is not None:
                 force_after = self.unbalanced(y + step)
-                error = float(np.linalg.norm(force_after - drag * step)) / (self.scale * size)
+                missed = float(np.linalg.norm(force_after - drag * step))
+                error = missed / (self.scale * max(size, ROUNDING_FORCE))
             if not error <= MAX_MODEL_ERROR:  # also no number
                 time_step /= TIME_STEP_DECREASE
                 continue

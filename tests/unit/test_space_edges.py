@@ -120,6 +120,19 @@ def pose(name):
     return low, solid.moved(np.array([0.01, 0.02, -2e-4]))
 
 
+def place_moved(surfaces, position, rotation, motion, amount):
+    """Place two blocks at these places, one of their twelve motions (m or rad) added."""
+    block, axis = divmod(motion, 6)
+    surfaces.position[:] = position
+    surfaces.rotation[:] = rotation
+    if axis < 3:
+        surfaces.position[block, axis] += amount
+    else:
+        turn = Rotation.from_rotvec(amount * np.eye(3)[axis - 3]).as_matrix()
+        surfaces.rotation[block] = rotation[block] @ turn
+    surfaces.place()
+
+
 @pytest.mark.parametrize("name", [*POSES])
 @pytest.mark.parametrize("order", [0, 1])
 def test_rates_of_closure_are_its_derivatives(name, order):
@@ -136,19 +149,13 @@ def test_rates_of_closure_are_its_derivatives(name, order):
     position, rotation = surfaces.position.copy(), surfaces.rotation.copy()
     step = 1e-6
     for motion in range(12):
-        block, axis = divmod(motion, 6)
-        found = []
+        closures = []
         for sign in (1.0, -1.0):
-            surfaces.position[:], surfaces.rotation[:] = position, rotation
-            if axis < 3:
-                surfaces.position[block, axis] += sign * step
-            else:
-                turn = Rotation.from_rotvec(sign * step * np.eye(3)[axis - 3]).as_matrix()
-                surfaces.rotation[block] = rotation[block] @ turn
-            surfaces.place()
+            place_moved(surfaces, position, rotation, motion, sign * step)
             reach = np.full(2, REACH)
-            found.append(find_contacts(surfaces, reach, 0.1, corner_length=STRIP).closure[touches])
-        derivative = (found[0] - found[1]) / (2 * step)
+            moved_points = find_contacts(surfaces, reach, 0.1, corner_length=STRIP)
+            closures.append(moved_points.closure[touches])
+        derivative = (closures[0] - closures[1]) / (2 * step)
         assert rows.kinematics[touches, 0, motion] == pytest.approx(derivative, abs=2e-6)
 
 
@@ -180,18 +187,11 @@ def test_forces_are_derivatives_of_the_stored_energy(name, order):
     step = 1e-7
     derivative = np.zeros(12)
     for motion in range(12):
-        block, axis = divmod(motion, 6)
         energies = []
         for sign in (1.0, -1.0):
-            surfaces.position[:], surfaces.rotation[:] = position, rotation
-            if axis < 3:
-                surfaces.position[block, axis] += sign * step
-            else:
-                turn = Rotation.from_rotvec(sign * step * np.eye(3)[axis - 3]).as_matrix()
-                surfaces.rotation[block] = rotation[block] @ turn
-            surfaces.place()
-            found = find_contacts(surfaces, np.full(2, REACH), 0.1, corner_length=STRIP)
-            energies.append(energy_of(found))
+            place_moved(surfaces, position, rotation, motion, sign * step)
+            points = find_contacts(surfaces, np.full(2, REACH), 0.1, corner_length=STRIP)
+            energies.append(energy_of(points))
         derivative[motion] = (energies[0] - energies[1]) / (2 * step)
     assert force == pytest.approx(-derivative, abs=2e-5 * np.abs(force).max())
     if name in ("between", "edge"):  # the change of areas matters

@@ -70,6 +70,27 @@ class EnergyBalance:
         self.start = float(self.energy[KINETIC] + self.energy[STORED] + self.energy[BOLTS])
         self.energy[TURNOVER] = self.start
 
+    def change_time_step(self, blocks: Blocks, old_dt: float, dt: float) -> None:
+        """Continue with the time step dt (s), where the velocities of the next step are known.
+
+        The reactions of drives become the ones that lead to these velocities, and the change of
+        kinetic energy that they bring is external work. The kinetic energy of motions that forces
+        move changes by m (F/m)^2 (old_dt^2 - dt^2)/8, because the integration in time conserves it
+        in this form. This is an error of the integration and stays in the balance.
+        """
+        driven = (blocks.drives.rows, blocks.drives.axes)
+        inertia = blocks.inertia * blocks.is_mobile
+        before = blocks.motion[len(blocks.velocity) :].T
+        after = blocks.velocity.T
+        total, _, drives = self.forces
+        planned = before[driven] + old_dt * total[driven] / blocks.inertia[driven]
+        reaction = blocks.inertia[driven] * (after[driven] - before[driven]) / dt - total[driven]
+        drives[driven] += reaction
+        total[driven] += reaction
+        self.energy[KINETIC] = (0.5 * inertia * after * (after - dt * total / blocks.inertia)).sum()
+        work = 0.5 * inertia[driven] * before[driven] * (after[driven] - planned)
+        self.energy[EXTERNAL_WORK] += work.sum()
+
     def change_loads(self, blocks: Blocks, change: np.ndarray, dt: float) -> None:
         """Correct the work of loads that change by `change` (n, dof) within a step dt (s).
 

@@ -9,9 +9,10 @@ real excavation makes. The forces that the removed blocks exert on the others ar
 a load (`Blocks.support`), which is ramped to zero over the release time of the stage. A step in
 which the blocks are removed changes no force on the rest. The joints of removed blocks end; their
 stored energy is entered as discarded, and the support does work as any other load does. A stage
-waits until the support of the previous stage is zero. The rock is at rest when the velocity and the
-acceleration of most blocks are small: not of all, for a single loose stone that rattles must not
-delay an excavation for ever.
+waits until the support of the previous stage is zero. The step that contains the given start time
+of a stage is divided there, so that the blocks are removed at this time. The rock is at rest when
+the velocity and the acceleration of most blocks are small: not of all, for a single loose stone
+that rattles must not delay an excavation for ever.
 """
 
 import io
@@ -39,7 +40,8 @@ WIDE_MARGIN = 0.4  # fraction of the limit: a step below it stays stable as leve
 LENGTH_TOLERANCE = 1e-6  # relative: lengths that differ by rounding only
 TINY = 1e-300  # lower bound of a denominator
 CHECK_INTERVAL = 16  # steps between two checks of drives and of excavation stages
-TIME_ROUNDING = 1e-6  # of a time step: a stage that starts so little after a step starts at it
+TIME_ROUNDING = 1e-12  # relative: times that differ by rounding only
+MIN_STEP_SHARE = 1e-4  # of the time step: shorter parts of a divided step lose digits of drives
 RESTING_SPEED = 1e-4  # m/s
 RESTING_ACCELERATION = 0.1  # m/s2
 RESTING_FRACTION = 0.9  # of the blocks that must be at rest for the next stage
@@ -136,6 +138,7 @@ class Simulation:
             self._restore(saved, step)
         else:
             self._start(step)
+        self._find_next_event()
 
     def _create_parts(self) -> None:
         """Create blocks, contact manager, joints and energy balance of the scene as drawn."""
@@ -164,6 +167,52 @@ class Simulation:
     def step(self) -> None:
         """Advance by one time step.
 
+        A step in which an excavation stage has its start time, or `[[water.at]]` a time, is divided
+        there.
+
+        Raises SceneError for a state that the method cannot treat.
+        """
+        if self.next_event - self.time > (1 + MIN_STEP_SHARE) * self.dt:
+            self._advance()
+        else:
+            self._advance_through_events()
+
+    def _find_next_event(self) -> None:
+        """Find `next_event` (s): the next start time of a stage or time of a water table."""
+        times = [time for time, _ in self.scene.water_changes]
+        begun = int(np.isfinite(self.stage_start_times).sum())
+        times += [stage["start"] for stage in self.scene.stages[begun : begun + 1]]
+        now = self.time * (1 + TIME_ROUNDING)
+        future = [time for time in times if time is not None and time > now]
+        self.next_event = min(future, default=np.inf)
+
+    def _advance_through_events(self) -> None:
+        """Take a time step in parts that end at the times of events.
+
+        An event that differs from the end of the step by less than MIN_STEP_SHARE of it moves the
+        end. Where the time step is halved on the way, the step ends with the part.
+        """
+        self._find_next_event()
+        dt = self.dt
+        end = self.time + dt
+        if abs(self.next_event - end) < MIN_STEP_SHARE * dt:
+            end = self.next_event
+        halvings_left = self.halvings_left
+        is_divided = False
+        while end - self.time > MIN_STEP_SHARE * dt and self.halvings_left == halvings_left:
+            part = min(self.next_event, end) - self.time
+            if abs(part - self.dt) > TIME_ROUNDING * end:
+                self._change_time_step(part)
+                is_divided = True
+            self._advance()
+            self._find_next_event()
+        if is_divided:
+            self._change_time_step(dt * 0.5 ** (halvings_left - self.halvings_left))
+            self._check_time_step()
+
+    def _advance(self) -> None:
+        """Advance by the time step `dt`.
+
         1. Blocks move; their contacts are updated, and searched again where blocks have moved far.
            An excavation removes blocks, or releases their support; the water table changes.
         2. The joints take a step: closure from the geometry, sliding from velocity times step.
@@ -175,7 +224,7 @@ class Simulation:
         self._move_blocks()
         if self.scene.stages:
             self._excavate()
-        if self.scene.water_changes and self.steps_since_change % CHECK_INTERVAL == 0:
+        if self.scene.water_changes:
             self._change_water_table()
         if self.arrays.transferred or self.arrays.rebuild:
             self._update_contact_list()
@@ -214,9 +263,9 @@ class Simulation:
     def _excavate(self) -> None:
         """Begin the next excavation stage when it is due, and reduce the support of removed blocks.
 
-        A stage with a start time is due in the step that reaches this time, which is the time that
-        the release of support is counted from. A stage without one is due when the blocks are at
-        rest, which is checked every CHECK_INTERVAL steps. The support is reduced in every step.
+        A stage with a start time is due in the step that ends at this time, which the release of
+        support is counted from. A stage without one is due when the blocks are at rest, which is
+        checked every CHECK_INTERVAL steps. The support is reduced in every step.
         """
         stages = self.scene.stages
         now = self.time + self.dt  # to which the blocks have moved
@@ -228,15 +277,17 @@ class Simulation:
                 is_due = is_checked and self._is_at_rest()
                 start = self.time
             else:
-                is_due = now >= start - TIME_ROUNDING * self.dt
+                is_due = now >= start * (1 - TIME_ROUNDING)
                 start = max(start, self.time)  # a stage before this one may have begun late
             if is_due:
                 self._remove_blocks(stages[begun]["blocks"])
                 self.stage_start_times[begun] = start
                 begun += 1
+                self._find_next_event()
         if self.blocks.support.any():
-            stage_end = self.stage_start_times[begun - 1] + stages[begun - 1]["release_time"]
-            self._release_support(stage_end - now)
+            stage_start = self.stage_start_times[begun - 1]
+            stage_end = stage_start + stages[begun - 1]["release_time"]
+            self._release_support(stage_end - now, min(now - stage_start, self.dt))
 
     def _remove_blocks(self, removed: list[int]) -> None:
         """Remove blocks, and keep the forces that they exert on the others as support."""
@@ -252,10 +303,15 @@ class Simulation:
         self.manager.needs_rebuild[removed] = True
         self.arrays.rebuild = 1
 
-    def _release_support(self, time_left: float) -> None:
-        """Reduce the support linearly, to zero at the end of the time left (s)."""
-        remaining = max(time_left, 0.0) / max(time_left + self.dt, self.dt)
-        self.blocks.support *= remaining
+    def _release_support(self, time_left: float, elapsed: float) -> None:
+        """Reduce the support linearly, to zero at the end of the time left (s).
+
+        elapsed: time (s) by which the release has gone on in this step.
+        """
+        if time_left > TIME_ROUNDING * self.time:
+            self.blocks.support *= time_left / (time_left + max(elapsed, 0.0))
+        else:
+            self.blocks.support[:] = 0.0
         self.energy_balance.change_loads(self.blocks, self._apply_loads(), self.dt)
 
     def _is_at_rest(self) -> bool:
@@ -270,8 +326,15 @@ class Simulation:
         return not blocks.support.any() and bool(is_resting)
 
     def _change_water_table(self) -> None:
-        """Load the blocks by the water table of the present time, unless it is the last one."""
-        time = min(self.time, self.scene.water_changes[-1][0])
+        """Load the blocks by the water table of the end of the step, unless it is the last one.
+
+        This is done in every CHECK_INTERVAL-th step, and at the times of the scene's tables.
+        """
+        now = self.time + self.dt  # to which the blocks have moved
+        is_at_event = now >= self.next_event * (1 - TIME_ROUNDING)
+        if not is_at_event and self.steps_since_change % CHECK_INTERVAL:
+            return
+        time = min(now, self.scene.water_changes[-1][0])
         if time > self.water_time:
             self.water_time = time
             self.energy_balance.change_loads(self.blocks, self._apply_loads(), self.dt)
@@ -300,13 +363,19 @@ class Simulation:
         return True
 
     def _change_time_step(self, dt: float) -> None:
-        """Continue with the time step dt (s): velocities are half a step ahead of positions."""
+        """Continue with the time step dt (s): velocities are half a step ahead of positions.
+
+        Drives get the reactions that bring their blocks to the prescribed velocities of the new
+        step.
+        """
         blocks = self.blocks
         drives = blocks.drives
+        balance = self.energy_balance
         now = self.time
-        half_change = 0.5 * (dt - self.dt) * self.energy_balance.forces[0] / blocks.inertia
+        half_change = 0.5 * (dt - self.dt) * balance.forces[0] / blocks.inertia
         blocks.velocity += (half_change * blocks.is_free).T
         blocks.velocity[drives.axes, drives.rows] = drives.velocity(now, dt)
+        balance.change_time_step(blocks, self.dt, dt)
         self.time_of_last_change = now
         self.steps_since_change = 0
         self.dt = dt

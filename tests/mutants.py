@@ -2,17 +2,20 @@
 
     python tests/mutants.py jointlaw/laws jointlaw/native/law.h --count 40 --seed 1
 
-A first run records which test runs which line; the record is reused for the same sources. Then each
-fault is run against the tests of its line; of its file if the line runs at import; of all joints or
-blocks if it is in C. Everything runs in copies of the index of git, staged changes included, under
-the temporary folder. Not part of CI. Needs `pip install pytest-cov`.
+A first run records which test executes which statements (`tests/executed.py`); the record of a test
+file is reused until anything that it executes or reads changes. Then each fault is run against the
+tests that execute it; a fault in C against all tests that run compiled joints or blocks. Everything
+runs in copies of the index of git, staged changes included, under the temporary folder. Build both
+compiled libraries first. Not part of CI.
 
     python tests/mutants.py --outputs --count 80 --seed 42
 
 inserts faults into what a user reads (`tests/output_faults.py`), as many of each kind. Each is run
-against the tests that are likely to detect it; then all that no test has detected are inserted at
-once and all tests are run, and the tests that fail are run against each fault alone. So every fault
-meets every test, unless two faults cancel each other.
+against tests that execute it, likely and fast ones first, up to `LIKELY_TIME`. Then the faults left
+are inserted at once, all test files that can detect one of them are run, and the failing tests are
+run against each fault alone. So every fault meets every test that can detect it, unless two faults
+cancel each other. With `--slow` the faults left then meet the slow tests of all files likewise
+(slow tests are not recorded).
 """
 
 import argparse
@@ -20,7 +23,6 @@ import ast
 import collections
 import hashlib
 import itertools
-import json
 import os
 import random
 import re
@@ -32,19 +34,13 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from executed import ExecutedMap
 from output_faults import all_faults
+from recorder import MODULE
 
 ROOT = Path(__file__).parents[1]
 WORK_FOLDER = Path(tempfile.gettempdir()) / f"mutants-{hashlib.sha256(bytes(ROOT)).hexdigest()[:8]}"
 BUILD_FOLDERS = {"jointlaw": "jointlaw/native/built", "dem_demo": "dem_demo/native/built"}
-COVERAGE = """\
-[run]
-source = jointlaw, dem_demo
-parallel = true
-patch = subprocess
-[json]
-show_contexts = true
-"""
 C_REPLACEMENTS = (
     (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " / "), (r" / ", " * "), (r" < ", " <= "),
     (r" > ", " >= "), (r" ([<>])= ", r" \1 "), (r" == ", " != "), (r" && ", " || "),
@@ -77,7 +73,8 @@ LIKELY_TESTS = {  # of faults of outputs: by kind and first folder
     ("state", "jointlaw"): "unit/test_joints.py",
     ("state", "dem_demo"): "verification/test_saved_state_whole.py",
 }
-TESTS_OF_PAGES = "examples/test_docs.py examples/test_numbers.py examples/test_make_all.py"
+TESTS_OF_PAGES = "examples/test_numbers.py examples/test_docs.py examples/test_make_all.py"
+LIKELY_TIME = 20.0  # s of processor time, of the tests that a fault of outputs meets first
 
 
 def with_fields(node, **fields):
@@ -211,26 +208,27 @@ class Copy:
                 shutil.copytree(ROOT / folder, self.root / folder, dirs_exist_ok=True)
 
 
-def tests_of_lines(marks):
-    """Tests of each line of each file; none for a line that only a command runs."""
-    copy = Copy("map")
-    paths = [path for path in sorted(copy.root.rglob("*.py")) if path.name != Path(__file__).name]
-    digest = hashlib.sha256(b"".join([marks.encode(), *(path.read_bytes() for path in paths)]))
-    data = WORK_FOLDER / f"lines-{digest.hexdigest()[:12]}.json"
-    if not data.exists():
-        (copy.root / "coverage.ini").write_text(COVERAGE)
-        options = "--cov", "--cov-config=coverage.ini", "--cov-context=test"
-        status, output = copy.run_pytest("-m", marks, *options, "--cov-report=json:lines.json")
-        if status:
-            raise SystemExit(f"tests fail without a fault:\n{output[-1000:]}")
-        (copy.root / "lines.json").rename(data)
-    return {
-        file: {
-            int(line): {context.rpartition("|")[0] for context in contexts if "::" in context}
-            for line, contexts in report["contexts"].items()
-        }
-        for file, report in json.loads(data.read_text())["files"].items()
-    }
+def recorded_tests(marks, processes):
+    """The map of the tests with these marks; test files whose record is stale run first."""
+    folder = WORK_FOLDER / f"executed-{marks.replace(' ', '-') or 'all'}"
+    copies = [Copy(f"record-{i}") for i in range(processes)]
+    tests = ExecutedMap(copies[0].root, folder)
+    queue = [file for file in tests.test_files() if tests.is_stale(file)]
+    failed = []
+
+    def record(copy):
+        while queue:
+            file = queue.pop()
+            output = tests.record(file, copy, marks)
+            if output:
+                failed.append(f"{file}:\n{output[-1000:]}")
+            print("recorded", file, f"{tests.records.get(file, {}).get('s', 0)} s", flush=True)
+
+    with ThreadPoolExecutor(processes) as pool:
+        list(pool.map(record, copies))
+    if failed:
+        raise SystemExit("tests fail without a fault:\n" + "\n".join(failed))
+    return tests
 
 
 def main():
@@ -240,13 +238,14 @@ def main():
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--limit", type=float, default=300.0, help="s for the tests of one fault")
+    parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--slow", action="store_true", help="the slow tests too")
     options = parser.parse_args()
     if options.outputs:
         try_faults_of_outputs(options)
         return
-    lines = tests_of_lines("" if options.slow else "not slow")
-    copies = [Copy(f"copy-{i}") for i in range(2)]
+    recorded = recorded_tests("" if options.slow else "not slow", options.processes)
+    copies = [Copy(f"copy-{i}") for i in range(options.processes)]
     faults = faults_by_line(copies[0].root, options.where)
     rng = random.Random(options.seed)
     selected = rng.sample(sorted(faults), min(options.count, len(faults)))
@@ -257,7 +256,7 @@ def main():
         for name, line, statement, start, end, new in drawn:
             text = (copy.root / name).read_bytes()
             faulty_text = text[:start] + new.encode() + text[end:]
-            tests = sorted(tests_of_statement(lines, name, statement), key=unit_tests_first)
+            tests = sorted(tests_of_statement(recorded, name, statement), key=unit_tests_first)
             if tests:
                 fate = copy.try_fault(name, faulty_text, tests, options.limit)
             else:
@@ -267,8 +266,8 @@ def main():
             change = " ".join(f"{text[start:end].decode()} -> {new}".split())
             print(*fate, f"\n  {name}:{line}: {source}\n  {change}", flush=True)
 
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(try_all, copies, (drawn[::2], drawn[1::2])))
+    with ThreadPoolExecutor(options.processes) as pool:
+        list(pool.map(try_all, copies, (drawn[i :: len(copies)] for i in range(len(copies)))))
     print(f"{len(faults)} lines; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
 
 
@@ -283,34 +282,89 @@ def try_faults_of_outputs(options):
     ):  # each kind by itself, so that a smaller count takes the first ones
         drawn = random.Random(f"{options.seed} {kind}").sample(by_kind[kind], len(by_kind[kind]))
         faults += drawn[: counts[kind]]
-    copy = Copy("outputs")
-    marks = "" if options.slow else "not slow"
+    tests = recorded_tests("not slow", options.processes)
+    copies = [Copy(f"outputs-{i}") for i in range(options.processes)]
     detected_by = {}
-    for fault in faults:
-        likely = LIKELY_TESTS.get((fault.kind, Path(fault.file).parts[0]), TESTS_OF_PAGES).split()
-        paths = [f"tests/{name}" for name in likely if (copy.root / "tests" / name).exists()]
-        failed = failing_tests(copy, [fault], ["-x", "-m", "not slow", *paths], options.limit)
-        if failed:
-            detected_by[fault] = failed[0]
-        print(fault.kind, f"{fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
-              detected_by.get(fault, "not by the likely tests"), flush=True)  # fmt: skip
+
+    def try_likely(copy, faults):
+        for fault in faults:
+            able = tests.able(fault.file, line_of(copy, fault))
+            chosen = likely_first(fault, able)
+            failed = chosen and failing_tests(
+                copy, [fault], ["-x", "-m", "not slow"], chosen, options.limit
+            )
+            if failed:
+                detected_by[fault] = failed[0]
+            print(fault.kind, f"{fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
+                  detected_by.get(fault, f"not by the likely of {len(able)} test files"),
+                  flush=True)  # fmt: skip
+
+    with ThreadPoolExecutor(options.processes) as pool:
+        list(pool.map(try_likely, copies, (faults[i :: len(copies)] for i in range(len(copies)))))
+    report(by_kind, faults, detected_by)
+    by_file = {fault: tests.able(fault.file, line_of(copies[0], fault)) for fault in faults}
+    try_together(copies[0], faults, detected_by, "not slow", by_file, options.limit)
+    report(by_kind, faults, detected_by)
+    if options.slow:
+        left = [fault for fault in faults if not detected_by[fault]]
+        every = dict.fromkeys(left, tests.test_files())
+        for fault in left:
+            del detected_by[fault]
+        try_together(copies[0], left, detected_by, "slow", every, options.limit)
+        report(by_kind, faults, detected_by)
+
+
+def try_together(copy, faults, detected_by, marks, able, limit):
+    """Insert all faults that no test has detected at once, then each alone for tests that failed.
+
+    `able[fault]` contains the test files that can detect a fault.
+    """
     while group := compatible([one for one in faults if one not in detected_by]):
-        print(f"{len(group)} faults at once", flush=True)
-        failed = failing_tests(copy, group, ["-m", marks], None)
+        files = sorted({file for fault in group for file in able[fault]})
+        print(f"{len(group)} faults at once, {len(files)} test files", flush=True)
+        failed = failing_tests(copy, group, ["-m", marks], files) if files else []
         if failed:
-            without_fault = failing_tests(copy, [], ["-m", marks, *failed], None)
+            without_fault = failing_tests(copy, [], ["-m", marks], failed)
             failed = [test for test in failed if test not in without_fault]
         for fault in group:
-            alone = ["-x", "-m", marks, *failed]
-            by = failed and failing_tests(copy, [fault], alone, options.limit)
+            own = [test for test in failed if test.partition("::")[0] in able[fault]]
+            by = own and failing_tests(copy, [fault], ["-x", "-m", marks], own, limit)
             detected_by[fault] = by[0] if by else ""
             print(f"{fault.kind} {fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
-                  detected_by[fault] or "SURVIVED", flush=True)  # fmt: skip
+                  detected_by[fault] or f"SURVIVED {marks}", flush=True)  # fmt: skip
+
+
+def report(by_kind, faults, detected_by):
+    """Print how many faults of each kind are detected so far."""
     for kind in sorted(by_kind):
         own = [fault for fault in faults if fault.kind == kind]
-        seen = sum(bool(detected_by[fault]) for fault in own)
+        seen = sum(bool(detected_by.get(fault)) for fault in own)
         print(f"{kind:10} {seen} of {len(own)} detected; {len(by_kind[kind])} possible")
-    print(f"all        {sum(map(bool, detected_by.values()))} of {len(faults)}")
+    print(f"all        {sum(map(bool, detected_by.values()))} of {len(faults)}", flush=True)
+
+
+def line_of(copy, fault):
+    """The line in which a fault begins."""
+    return (copy.root / fault.file).read_bytes()[: fault.start].count(b"\n") + 1
+
+
+def likely_first(fault, able):
+    """Tests that execute a fault, of likely files and fast ones first, of `LIKELY_TIME` in all."""
+    kind = fault.kind, Path(fault.file).parts[0]
+    likely = [f"tests/{name}" for name in LIKELY_TESTS.get(kind, TESTS_OF_PAGES).split()]
+
+    def rank(file):
+        seconds = sum(duration for _, duration in able[file])
+        return likely.index(file) if file in likely else len(likely), seconds
+
+    chosen = []
+    left = LIKELY_TIME
+    for file in sorted(able, key=rank):
+        for name, seconds in able[file]:
+            left -= seconds
+            if left > 0.0 or not chosen:
+                chosen.append(name)
+    return chosen
 
 
 def compatible(faults):
@@ -330,15 +384,16 @@ def compatible(faults):
     return chosen
 
 
-def failing_tests(copy, faults, arguments, limit):
-    """Tests that fail with these faults, in the order of their report."""
+def failing_tests(copy, faults, arguments, tests, limit=None):
+    """Tests, of these, that fail with these faults, in the order of their report."""
+    (copy.root / "chosen").write_text("\n".join(tests))
     originals = {fault.file: (copy.root / fault.file).read_bytes() for fault in faults}
     try:
         for fault in sorted(faults, key=lambda one: one.start, reverse=True):
             path = copy.root / fault.file
             text = path.read_bytes()
             path.write_bytes(text[: fault.start] + fault.new.encode() + text[fault.end :])
-        status, output = copy.run_pytest("-n0", *arguments, limit=limit)
+        status, output = copy.run_pytest("-n0", *arguments, "@chosen", limit=limit)
     except subprocess.TimeoutExpired:
         return ["too long"]
     finally:
@@ -360,17 +415,18 @@ def faults_by_line(root, places):
     return faults
 
 
-def tests_of_statement(lines, name, statement):
-    """Tests that run a statement; in C (0) tests of the Python module that loads the library."""
+def tests_of_statement(recorded, name, statement):
+    """Tests that run a statement; in C (0) tests that run compiled joints or blocks."""
     if statement:
-        by_line = lines.get(name, {})
-        if statement not in by_line:
-            return set()
-    else:
-        module = "dem_demo/compiled.py" if "dem_demo" in name else "jointlaw/kernels/engine.py"
-        by_line = lines.get(module, {})
-    every = set().union(*(tests for file in lines.values() for tests in file.values()))
-    return by_line.get(statement) or set().union(*by_line.values()) or every
+        able = recorded.able(name, statement)
+        return {test for tests in able.values() for test, _ in tests}
+    module = "dem_demo/compiled.py" if "dem_demo" in name else "jointlaw/kernels/engine.py"
+    return {
+        test
+        for record in recorded.records.values()
+        if any(file == module and function != MODULE for file, function, _ in record["blocks"])
+        for test in record["tests"]
+    }
 
 
 def unit_tests_first(test):

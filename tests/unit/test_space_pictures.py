@@ -7,10 +7,11 @@ import csv
 import json
 import re
 from importlib.util import find_spec
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
+from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.figure import Figure
 from scene_text import block
 from scipy.spatial.transform import Rotation
@@ -186,6 +187,164 @@ def test_without_pyvista_a_run_says_so_and_writes_vtk_files(tmp_path, capsys, mo
     assert (tmp_path / "vtk" / "blocks_0000.vtu").exists()
     assert not list(tmp_path.glob("*.png"))
     assert (tmp_path / "view.html").exists()
+
+
+class RecordedPyvista:
+    """Stands for pyvista: keeps the meshes and options that a plotter is given, draws nothing."""
+
+    class PolyData:
+        def __init__(self, points, faces=None, lines=None):
+            self.points = np.array(points, float)
+            self.cells = np.array(lines if faces is None else faces)
+            self.cell_data = {}
+
+    class Light:
+        def __init__(self, position, light_type):
+            self.position = position
+
+    class Plotter:
+        def __init__(self, off_screen, window_size):
+            self.window_size = window_size
+            self.meshes = {}
+            self.camera = SimpleNamespace()
+            self.lights = []
+
+        def enable_anti_aliasing(self, kind):
+            pass
+
+        def remove_all_lights(self):
+            self.lights.clear()
+
+        def add_light(self, light):
+            self.lights.append(light)
+
+        def add_mesh(self, mesh, name, **options):
+            assert isinstance(mesh, RecordedPyvista.PolyData)
+            self.meshes[name] = mesh, options
+
+
+def segments_of(mesh):
+    """Blocks and ends (m, 2, 3) of the segments of a mesh."""
+    cells = mesh.cells.reshape(-1, 3)
+    assert (cells[:, 0] == 2).all()
+    return np.array(mesh.cell_data["block"]), mesh.points[cells[:, 1:]]
+
+
+@pytest.mark.parametrize("by", ["state", "displacement"])
+def test_meshes_and_options_of_a_picture(drawing, moved, by, monkeypatch):
+    """Faces, edges, outlines and hatching are at the places of the blocks, and coloured by them."""
+    monkeypatch.setattr(space_pictures, "import_pyvista", lambda: RecordedPyvista)
+    pictures = SpacePictures(drawing, [drawing.as_drawn, moved], by=by)
+    plotter = pictures.plotter(1, 1000)
+    assert [*plotter.meshes] == ["blocks", "edges", "marked", "rough direction"]
+    mesh, options = plotter.meshes["blocks"]
+    distances = np.array([0.0, 5.0, 1.0])  # mm: west by 3 and 4 mm, east by 1 mm
+    block = np.array(mesh.cell_data["block"])
+    assert np.bincount(block).tolist() == [6, 6, 6]
+    np.testing.assert_allclose(mesh.cell_data["displacement (mm)"], distances[block])
+    if by == "state":
+        names = [*STATE_COLOURS]
+        states = [names[number] for number in mesh.cell_data["state"]]
+        expected = ["fixed", "unstable", "stable"]
+        assert states == [expected[number] for number in block]
+        assert options["scalars"] == "state"
+        low, high = options["clim"]
+        for number, colour in enumerate(STATE_COLOURS.values()):  # as VTK looks a colour up
+            assert to_rgb(colour) == options["cmap"]((number - low) / (high - low))[:3]
+    else:
+        assert options["scalars"] == "coloured by"
+        np.testing.assert_allclose(
+            mesh.cell_data["coloured by"], np.where(block == 0, -1.0, distances[block])
+        )
+        assert options["cmap"] is DISPLACEMENT_COLOURS
+        assert options["clim"] == pytest.approx((0.0, 5.0))
+        assert options["below_color"] == STATE_COLOURS["fixed"]
+    towards_eye = 1e-3 * drawing.size * pictures.eye
+    half = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    cosine, sine = np.cos(TURN), np.sin(TURN)
+    west = half @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    west += np.array([-3 + 3e-3, 0, 1 + 4e-3])
+    edges, look = plotter.meshes["edges"]
+    number, ends = segments_of(edges)
+    assert np.bincount(number).tolist() == [12, 12, 12]
+    corners = np.unique((ends[number == 1] - towards_eye).reshape(-1, 3).round(9), axis=0)
+    np.testing.assert_allclose(corners, np.unique(west.round(9), axis=0), atol=1e-8)
+    outlined, thick = plotter.meshes["marked"]
+    number, ends = segments_of(outlined)
+    assert set(number) == {1}
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) == pytest.approx(2.0)
+    corners = np.unique((ends - 2 * towards_eye).reshape(-1, 3).round(9), axis=0)
+    np.testing.assert_allclose(corners, np.unique(west.round(9), axis=0), atol=1e-8)
+    assert thick["line_width"] > 2 * look["line_width"] > 0.0
+    assert thick["lighting"] is False
+    assert thick["color"] == space_pictures.MARKED_COLOUR
+    hatching, _ = plotter.meshes["rough direction"]
+    number, ends = segments_of(hatching)
+    for block, turn in ((0, 0.0), (1, TURN), (2, 0.0)):
+        angle = np.radians(ROUGH) + turn  # lines turn with their block
+        lines = (ends[:, 1] - ends[:, 0])[number == block]
+        assert len(lines) == (drawing.hatch_block == block).sum() > 0
+        assert np.abs(np.cross(lines, [-np.sin(angle), np.cos(angle), 0.0])).max() < 1e-9
+    camera = plotter.camera
+    seen = np.subtract(camera.position, camera.focal_point)
+    np.testing.assert_allclose(seen / np.linalg.norm(seen), pictures.eye, atol=1e-12)
+    assert camera.parallel_projection
+    height = pictures.high[1] - pictures.low[1]
+    assert camera.parallel_scale == pytest.approx(0.5 * height)
+
+
+def test_colours_of_states():
+    """Grey, green, orange-red and yellow: what the legend calls them is what a reader expects."""
+    hue, saturation, _ = rgb_to_hsv([to_rgb(colour) for colour in STATE_COLOURS.values()]).T
+    by_name = dict(zip(STATE_COLOURS, zip(360 * hue, saturation, strict=True), strict=True))
+    assert by_name["fixed"][1] < 0.1
+    assert 100 < by_name["stable"][0] < 180
+    assert by_name["unstable"][0] < 40
+    assert 45 < by_name["not decided"][0] < 65
+
+
+def test_scale_bar_compass_and_note(drawing, moved, monkeypatch):
+    """Artists below the solids, in metres of the picture."""
+    monkeypatch.setattr(SpacePictures, "render", lambda *_: np.zeros((4, 4, 4)))
+    pictures = SpacePictures(drawing, [drawing.as_drawn, moved])
+    figure, axes = pictures.figure()
+    pictures.draw(axes, 1, "t = 0.25 s")
+    (image,) = axes.images
+    left, right, bottom, top = image.get_extent()
+    assert [left, bottom] == pytest.approx(pictures.low)
+    assert [right, top] == pytest.approx(pictures.high)
+    # the fixed rock is 12 m by 6 m in plan, 2 m high
+    assert right - left >= np.ptp(drawing.solids[0].vertices @ pictures.right)
+    (line,) = axes.lines
+    assert line.get_gid() == "scale bar"
+    x, y = line.get_data()
+    texts = {text.get_text(): text for text in axes.texts if text.get_text()}
+    label = texts.pop(f"{np.ptp(x):g} m")
+    assert y[0] == y[1]
+    assert axes.get_ylim()[0] < y[0] < bottom
+    assert left < x.min() < x.max() < right
+    assert label.get_position()[0] == pytest.approx(x.mean())
+    assert axes.get_ylim()[0] < label.get_position()[1] < y[0]  # below the bar
+    assert (label.get_ha(), label.get_va()) == ("center", "top")
+    note = texts.pop("t = 0.25 s")
+    assert note.get_gid() == "note"
+    assert note.get_position() == pytest.approx((0.5 * (left + right), y[0]))
+    arrows = {text.get_gid(): text for text in axes.texts if text.get_gid() in ("N", "up")}
+    assert {*texts} == {*arrows} == {"N", "up"}
+    for name, axis in (("N", [0.0, 1.0, 0.0]), ("up", [0.0, 0.0, 1.0])):
+        arrow = arrows[name]
+        origin = np.array(arrow.get_position())
+        assert arrow.arrowprops["arrowstyle"] == "-|>"  # with its head at the end
+        assert arrow.arrowprops["color"] == "k"
+        along = np.subtract(arrow.xy, origin)
+        seen = np.array([pictures.right @ axis, pictures.up @ axis])
+        np.testing.assert_allclose(along / np.linalg.norm(along), seen / np.linalg.norm(seen))
+        beyond = np.array(texts[name].get_position()) - origin
+        np.testing.assert_allclose(beyond / np.linalg.norm(beyond), seen / np.linalg.norm(seen))
+        assert np.linalg.norm(beyond) > np.linalg.norm(along)
+        assert left < origin[0] < 0.5 * (left + right)
+        assert axes.get_ylim()[0] < origin[1] < bottom
+    assert figure.get_suptitle() == "known blocks"
 
 
 # ------------------------------------------------------------------------------- drawn by pyvista

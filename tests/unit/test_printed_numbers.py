@@ -1,0 +1,396 @@
+"""Numbers with units in reports and messages: each against the value in SI units that was given.
+
+Functions that write reports get results that are known in advance. `quantities` reads the numbers
+of a text with their units, and converts them by a table of this file. Angles are between 1 and 89
+degrees, where degrees and radians differ.
+"""
+
+import json
+import math
+import re
+from inspect import signature
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from dem_demo.cli import main as run_blocks
+from jointlaw.accuracy import slip as slip_tests
+from jointlaw.accuracy import suite
+from jointlaw.calibration import datasets, field
+from jointlaw.calibration.aperture import FlowConditions, FlowFit, FlowTest
+from jointlaw.calibration.fit import Fit
+from jointlaw.calibration.meaning import describe
+from jointlaw.calibration.measured import ShearCurve
+from jointlaw.cli import card, scan
+from jointlaw.cli import field as field_command
+from jointlaw.cli import fit as fit_command
+from jointlaw.cli.main import main
+from jointlaw.parameters.about import About
+from jointlaw.parameters.aperture import Aperture
+from jointlaw.surface.faces import CompositeSurface
+
+SI = {
+    "m": 1.0, "mm": 1e-3, "um": 1e-6, "m2": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa/m": 1e9,
+    "kN": 1e3, "ml/min": 1e-6 / 60, "mPa s": 1e-3, "%": 0.01, "deg": math.radians(1),
+    "degrees": math.radians(1), "°": math.radians(1),
+}  # fmt: skip
+UNIT = "|".join(sorted(map(re.escape, SI), key=len, reverse=True))
+NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+LAW = jl.JointLaw(
+    orientation=jl.Orientation(4.0),
+    asperity=jl.Asperity(K=2e10, lam=1.2, eta=0.5, mu=0.6),
+    heights=jl.GammaHeights(3.0, 20e-6, formation="individual"),
+    asperity_density=1e6,
+    plane=0.0,
+    mating_length=2e-3,
+    resolution="fast",
+)
+
+
+def quantities(text):
+    """Numbers of a text with their units, in SI units, in their order."""
+    found = re.findall(rf"({NUMBER}) ?({UNIT})(?![\w/])", text)
+    return [float(number) * SI[unit] for number, unit in found]
+
+
+def cells_in_si(lines):
+    """Rows of the first table of Markdown lines, numbers in SI units by the heads of columns."""
+    rows = [line.strip("| ").split("|") for line in lines if "|" in line]
+    units = [re.findall(r"\(([^()]+)\)", head) for head in rows[0]]
+    result = []
+    for row in rows[2:]:
+        numbers = [re.findall(NUMBER, cell) for cell in row]
+        result.append(
+            [
+                [float(one) * SI[unit[min(k, len(unit) - 1)]] for k, one in enumerate(cell)]
+                for cell, unit in zip(numbers, units, strict=False)
+                if unit
+            ]
+        )
+    return result
+
+
+# ------------------------------------------------------------------------------- cards and meaning
+
+
+def test_properties_on_a_card():
+    text = card.describe(LAW, About(), "law").partition("## Properties")[2].partition("## ")[0]
+    for row, stress in zip(cells_in_si(text.splitlines()), (1e5, 1e6, 1e7), strict=True):
+        closure = float(LAW.closure(stress))
+        assert row[0] == [pytest.approx(stress)]
+        assert row[1] == [pytest.approx(closure, rel=1e-3)]
+        assert row[2] == pytest.approx(LAW.secant_stiffness(stress), rel=1e-3)
+        assert row[2][0] == pytest.approx(stress / closure, rel=1e-3)
+    (valid, _) = card._limits(LAW)
+    closure = LAW.closure_range
+    expected = [closure, float(LAW.normal_stress(closure))]
+    assert quantities(valid) == pytest.approx(expected, rel=1e-3)
+
+
+def test_meaning_of_a_law():
+    lines = describe(LAW, [1e6, 4e6], assumed_stiffness=(40e9, 3e6))
+    distance = 1e6**-0.5
+    assert quantities(lines[0]) == pytest.approx([distance, distance], rel=1e-2)
+    for row, stress in zip(cells_in_si(lines[1:6]), (1e6, 4e6), strict=True):
+        closure = float(LAW.closure(stress))
+        step = 1e-4 * closure
+        rise = LAW.normal_stress(closure + step) - LAW.normal_stress(closure - step)
+        assert [cell[0] for cell in row] == pytest.approx(
+            [
+                stress,
+                closure,
+                rise / (2 * step),
+                LAW.secant_stiffness(stress)[1],
+                LAW.contact_fraction(closure),
+            ],
+            rel=1e-2,
+        )
+    (assumed,) = (line for line in lines if "assumed normal stiffness" in line)
+    assert quantities(assumed)[:2] == pytest.approx([40e9, 3e6])
+
+
+# -------------------------------------------------------------------------- values from the field
+
+
+def test_given_field_values_in_degrees_and_radians():
+    assert signature(jl.from_field).parameters["basic_friction"].default == pytest.approx(np.pi / 6)
+    values = {"jcs": 100e6, "length": 0.1, "normal_stress": 1e6, "normal_stiffness": 30e9}
+    with pytest.raises(ValueError, match="roughness angle") as refused:
+        jl.from_field(jrc=30.0, basic_friction=np.radians(35), **values)
+    numbers = re.search(
+        rf"roughness angle of ({NUMBER}) degrees above ({NUMBER}): it must be 1 to ({NUMBER})",
+        str(refused.value),
+    ).groups()
+    assert [*map(float, numbers)] == pytest.approx([60.0, 35.0, 80.0 - 35.0])  # 30 log10(100)
+
+
+def test_peak_that_no_law_has(monkeypatch):
+    def fail(*_):
+        raise ValueError("not reached")
+
+    monkeypatch.setattr(field, "shear_past_peak", fail)
+    values = {"jcs": 100e6, "length": 0.1, "normal_stress": 1e6, "normal_stiffness": 30e9}
+    with pytest.raises(ValueError, match="no law has this") as refused:
+        jl.from_field(jrc=10.0, basic_friction=np.radians(30), **values)
+    text = str(refused.value).partition("a peak of")[2]
+    displacement = 0.1 / 500 * (10.0 / 0.1) ** 0.33  # Barton & Bandis 1982
+    assert quantities(text) == pytest.approx([np.radians(50), displacement], rel=1e-2)
+
+
+def test_first_law_from_field_values():
+    law = field._initial_law(np.radians(30), 20.0, 2e6, 1e-3)
+    assert law.orientation.a == pytest.approx(90 / 20)
+    assert law.asperity.mu == pytest.approx(np.tan(np.pi / 6))
+    work = 1.25 * law.mating_length * 2e6 * np.tan(np.radians(50))
+    assert law.slope_wear == pytest.approx(work)
+
+
+def test_command_of_field_values(in_an_empty_folder, monkeypatch, capsys):
+    record = SimpleNamespace(
+        peak_friction_angle=47.3, peak_dilation_angle=12.4, plot=lambda path: path.touch(),
+        summary=dict,
+    )  # fmt: skip
+    result = SimpleNamespace(record=record, peak_displacement=0.83e-3, normal_stiffness=29.2e9)
+    monkeypatch.setattr(field_command, "from_field", lambda **_: LAW)
+    monkeypatch.setattr(field_command, "shear_past_peak", lambda *_: result)
+    words = "field --jrc 8 --jcs 100MPa --length 20cm --normal-stress 2MPa --basic-friction 31deg"
+    assert main([*words.split(), "--normal-stiffness", "30GPa/m", "--out", "out"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    roughness = 8 * math.log10(100 / 2)  # degrees
+    barton_displacement = 0.2 / 500 * (8 / 0.2) ** 0.33
+    expected = {
+        "Joint of": [0.2, 2e6],
+        "- peak friction angle": np.radians([47.3, 31.0 + roughness]),
+        "- shear displacement": [0.83e-3, barton_displacement],
+        "- largest dilation": np.radians([12.4, roughness / 2]),
+        "- normal stiffness": [29.2e9],
+    }
+    for start, values in expected.items():
+        (line,) = (line for line in lines if line.startswith(start))
+        line = re.sub(rf"({UNIT}) \(({NUMBER})\)", r"\1 (\2 \1)", line)  # the unit stands once
+        assert quantities(line) == pytest.approx(values, rel=1e-2), start
+    warnings = json.loads(Path("out/summary.json").read_text())["warnings"]
+    assert quantities(" ".join(warnings))[0] == pytest.approx(2e6)
+
+
+# ------------------------------------------------------------------------------- scans and flow
+
+
+def test_alignment_of_two_faces():
+    z = 1e-5 * np.array([[1.0, -1.0], [-1.0, 1.0]])  # 10 um rms
+    composite = CompositeSurface(z, "rows", (2e-3, -3e-3), math.radians(1.5), 0.9)
+    text = composite.describe()
+    expected = [-3e-3, 2e-3, math.radians(1.5), 1e-5]
+    assert quantities(text) == pytest.approx(expected)
+    assert "-3 mm along the rows and 2 mm along the columns" in text
+    assert "correlation of the faces is 0.900" in text
+
+
+def test_report_of_a_scan(monkeypatch):
+    lengths = []
+
+    def resample(z, spacing, length):
+        lengths.append(length)
+        return SimpleNamespace(orientation=SimpleNamespace(a=3.0), length=length)
+
+    monkeypatch.setattr(scan, "from_surface", resample)
+    monkeypatch.setattr(scan, "_friction_angles", lambda fit: "31.0° | 35.0°")
+    fit = SimpleNamespace(
+        asperities=SimpleNamespace(size=0.4e-3), spacing=1e-4, warnings=[], not_identifiable={}
+    )
+    text = scan._report_friction(fit, None)
+    introduction, *_ = (line for line in text.splitlines() if "Friction angle" in line)
+    assert quantities(introduction)[0] == pytest.approx(1e6)
+    rows = cells_in_si([line for line in text.splitlines() if "|" in line])
+    assert [row[0][0] for row in rows] == pytest.approx(lengths)
+    assert lengths[0] == 0.4e-3
+    (warning,) = scan._warnings(fit)
+    assert quantities(warning) == [pytest.approx(0.4e-3)]
+
+
+def test_friction_angles_of_a_scan_are_at_the_stress_of_the_report(monkeypatch):
+    used = []
+
+    def shear(joint, to, normal, steps):
+        used.append((to, normal))
+        return SimpleNamespace(peak_friction_angle=40.0 + len(used))
+
+    monkeypatch.setattr(scan, "direct_shear", shear)
+    fit = SimpleNamespace(
+        asperities=SimpleNamespace(size=0.4e-3),
+        law=lambda rock, plane: LAW,
+        orientation_is_representative=True,
+    )
+    assert scan._friction_angles(fit) == "41.0° | 42.0°"
+    assert used == [(0.4e-3, pytest.approx(1e6))] * 2
+
+
+def test_conditions_of_flow():
+    radial = FlowConditions.radial((5e-3, 40e-3), rate=1e-8, outlet_pressure=2e4)
+    assert quantities(radial.description) == pytest.approx([5e-3, 40e-3])
+    linear = FlowConditions.linear(0.12, 0.05, rate=1e-8, outlet_pressure=2e4)
+    assert quantities(linear.description) == pytest.approx([0.12, 0.05])
+
+
+def test_report_and_summary_of_a_flow_test():
+    stress = np.array([1e6, 2e6, 4e6, 8e6, 2e6])
+    aperture = np.array([40e-6, 30e-6, 20e-6, 10e-6, 15e-6])
+    a = Aperture(hydraulic=38e-6, at=7e-6, length=11e-6)
+    curves = {"map of the law's closure": 1.25 * aperture, "Bandis": 0.9 * aperture}
+    is_fitted = np.array([True, True, True, False, False])
+    test = FlowTest(stress, aperture, None, "flow.csv")
+    fit = FlowFit(test, np.zeros(5), is_fitted, a, curves)
+    text = fit.report()
+    sentences = [line for line in text.splitlines() if line and "|" not in line]
+    assert quantities(sentences[1]) == pytest.approx([4e6])
+    assert quantities(sentences[2]) == pytest.approx([38e-6, 7e-6, 11e-6])
+    table = [line for line in text.splitlines() if "|" in line]
+    assert "error at 8 MPa (%)" in table[0]
+    assert "rms error on unloading (%)" in table[0]
+    cells = [re.findall(NUMBER, line) for line in table[2:]]
+    assert [[*map(float, row)] for row in cells] == [[25.0, 25.0], [-10.0, 10.0]]
+    summary = fit.summary()
+    assert summary["aperture_SI"] == {"hydraulic": 38e-6, "at": 7e-6, "length": 11e-6}
+    assert {*summary["aperture_errors"]} == {*curves}
+    errors = summary["aperture_errors"]["Bandis"]
+    assert errors == {
+        "at_largest_stress": pytest.approx(-0.1), "unloading_rms": pytest.approx(0.1)
+    }  # fmt: skip
+
+
+# ------------------------------------------------------------------------------------- shear tests
+
+
+def test_table_of_peaks_and_interval_of_the_opening():
+    shear = np.array([0.0, 1e-3, 2e-3, 4e-3])
+    curve = ShearCurve(
+        shear,
+        np.array([0.0, 2.5e6, 2.2e6, 1.9e6]),
+        3e6,
+        opening=np.array([0.0, 1e-4, 2e-4, 3e-4]),
+        name="a",
+    )
+    law = SimpleNamespace(
+        shear=shear, stress=np.array([0.0, 2.0e6, 2.4e6, 1.8e6]), opening=np.linspace(0, 2e-4, 4)
+    )
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(shears=[curve]), predict_shear=lambda *_: [law],
+        discretisation_error=0.02, has_trade_off=True,
+        opening_interval=((1e-4, np.tan(np.radians(3.0))), (5e-4, np.tan(np.radians(12.0)))),
+    )  # fmt: skip
+    lines = Fit._peak_table(fit)
+    table = [line for line in lines if "|" in line]
+    heads = [re.findall(r"\((\w+)\)", head) for head in table[0].strip("|").split("|")]
+    cells = [re.findall(NUMBER, cell) for cell in table[2].strip("|").split("|")]
+    units = [None, ["MPa", "mm"], ["MPa", "mm"], ["MPa"], ["MPa"], ["mm"], ["mm"]]
+    # a head without a unit continues the one before
+    assert [head for head in heads if head] == [["MPa", "mm"], ["MPa"], ["mm"]]
+    values = [
+        [float(one) * SI[unit] for one, unit in zip(cell, names, strict=True)]
+        for cell, names in zip(cells[1:], units[1:], strict=True)
+    ]
+    expected = [[2.5e6, 1e-3], [2.4e6, 2e-3], [1.9e6], [1.8e6], [3e-4], [2e-4]]
+    for actual, value in zip(values, expected, strict=True):
+        assert actual == pytest.approx(value)
+    change, opening = (line for line in lines if "%" in line)
+    assert quantities(change) == [pytest.approx(0.02)]
+    numbers = re.search(
+        rf"opening is ({NUMBER}) to ({NUMBER}) mm, and of the largest dilation angle ({NUMBER}) "
+        rf"to ({NUMBER}) degrees",
+        opening,
+    ).groups()
+    assert [*map(float, numbers)] == pytest.approx([0.1, 0.5, 3.0, 12.0])
+
+
+def test_notes_and_messages_of_shear_files():
+    gauges = [SimpleNamespace(title="left"), SimpleNamespace(title="right")]
+    mean, note = datasets._mean_of_gauges(gauges, [np.array([0, 2e-3]), np.array([0, 3e-3])])
+    np.testing.assert_allclose(mean, [0.0, 2.5e-3])
+    assert quantities(note) == [pytest.approx(1e-3)]
+    readings = {
+        "shear": np.array([0.0, 1e-3, 2e-3, 3e-3, 0.0, 1e-3]),
+        "stress": np.array([0.0, 1e6, 2e6, 2e6, 0.0, 1e6]),
+    }
+    table = SimpleNamespace(name="shear.csv")
+    with pytest.raises(ValueError, match="returns from 3 to 0 mm"):
+        datasets._require_one_test(readings, [*range(2, 8)], table)
+
+
+def test_summaries_of_predictions():
+    held_out = SimpleNamespace(stress=np.array([3e6, 6e6]))
+    text = fit_command._report_held_out(held_out, np.array([0.02, -0.05]))
+    assert "-5.0 % at the largest, 6 MPa" in text
+    curves = [SimpleNamespace(normal=normal) for normal in (1e6, 4e6)]
+    with pytest.raises(ValueError, match="at 1MPa, 4MPa: name two"):
+        fit_command._split_shear_tests(curves, [1e6])
+
+
+# --------------------------------------------------------------------------------------- accuracy
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 25.0, 90.0])
+def test_angles_of_slip_tests(azimuth, monkeypatch):
+    """A joint of known tractions, which opens by half of its slip forwards."""
+    sheared = []
+
+    def joints(n, **_):
+        def update(step, tangent):
+            sheared.append(step[:, 1:])
+            sense = np.sign(step[:, 1:] @ direction)[:, None]
+            return np.column_stack([np.full(n, 2e6), sense * 1e6 * direction]), None
+
+        return SimpleNamespace(update=update)
+
+    direction = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))])
+    law = SimpleNamespace(tables=SimpleNamespace(dim=3), mating_length=1e-3, joints=joints)
+    monkeypatch.setattr(
+        slip_tests,
+        "closing_increments",
+        lambda batch, step, *_: -0.5 * np.linalg.norm(step[:, 1:], axis=1),
+    )
+    tests = np.array([(1.0, azimuth, 1.0)])
+    results = slip_tests.run_slip_tests(law, 1e-4, 2e6, tests)
+    np.testing.assert_allclose(results.friction, np.degrees(np.arctan2(1e6, 2e6)))
+    np.testing.assert_allclose(results.dilation, np.degrees(np.arctan(0.5)))
+    total = np.sum(sheared[: slip_tests.STEPS_PER_LEG], axis=0)[0]
+    np.testing.assert_allclose(total, slip_tests.max_slip(1e-3, 1e-4) * direction, atol=1e-15)
+
+
+def test_angles_of_the_accuracy_suite():
+    law = SimpleNamespace(
+        asperity=SimpleNamespace(mu=np.tan(np.radians(31))), orientation=SimpleNamespace(a=5.0)
+    )
+    assert suite.limit_friction_angle(law) == pytest.approx(31.0 + 18.0)
+    path = suite._in_space(np.array([[0.1, 2.0]]), 30.0)
+    np.testing.assert_allclose(path, [[0.1, 2 * np.cos(np.pi / 6), 1.0]])
+    law = SimpleNamespace(closure_range=1e-4, mating_length=1e-3, closure=lambda stress: 5e-5)
+    quarter = SimpleNamespace(uniform=lambda low, high: low + (high - low) / 4)
+    path = suite.random_slip_path(law, quarter, 1e6, np.linspace(0.0, 1.0, 11))
+    assert np.abs(path[:, 1]).max() < 1e-12  # a quarter of a turn from the first direction
+    assert path[:, 2].max() > 0.1
+
+
+# ----------------------------------------------------------------------------------------- blocks
+
+
+def test_laws_of_a_comparison_are_printed_in_degrees_and_millimetres(monkeypatch, capsys):
+    from dem_demo.studies import compare
+
+    law = jl.CoulombLaw(
+        friction=np.tan(np.radians(40)), residual_friction=np.tan(np.radians(30)), weakening=2.5e-3,
+        normal_stiffness=1e9, shear_stiffness=1e9,
+    )  # fmt: skip
+    row = {
+        "laws": {"rock": law}, "stopped": "", "seed": 1, "law": "Coulomb", "time_s": 1.0,
+        "rock": "slab", "state": "stable", "displacement_m": 0.0,
+    }  # fmt: skip
+    monkeypatch.setattr(compare, "compare", lambda *_: [row])
+    monkeypatch.setattr("dem_demo.cli.format_outcome", lambda row: "")
+    scene = SimpleNamespace(rocks=["slab"])
+    monkeypatch.setattr("dem_demo.cli._load_in_plane", lambda options: scene)
+    run_blocks(["compare", "slope"])
+    line = capsys.readouterr().out.splitlines()[0]
+    assert "40.0 degrees at the peak, 30.0 after 2.5 mm" in line

@@ -23,7 +23,7 @@ moment acts too. It is taken at the mean of both angular velocities, where it do
 "bolts" is the energy that rock bolts store and have dissipated by yielding, a function of their
 elongations. What leaves the balance for good. "friction": energy dissipated by the joints;
 "dashpots": by viscous damping; "discarded": stored energy of contacts that were removed while they
-still carried load, or became shorter.
+still carried load, or became shorter, and kinetic energy of blocks that an excavation removed.
 
 `native/blocks.c` adds the entries of each step; this module opens the balance and reads it.
 """
@@ -99,6 +99,24 @@ class EnergyBalance:
         self.energy[EXTERNAL_WORK] -= (
             0.5 * dt * (change * blocks.motion[len(blocks.motion) // 2 :].T).sum()
         )
+
+    def discard_blocks(
+        self, blocks: Blocks, removed: list[int], support: np.ndarray, dt: float
+    ) -> None:
+        """Enter the kinetic energy of blocks that are about to be removed as discarded.
+
+        The blocks have moved by a step dt (s) since the last entries, at which they are removed.
+        Since then, the forces `support` (n, dof) of their joints have done work on the other
+        blocks for half a step, by the trapezoidal rule, at the expense of the stored energy that
+        leaves with the joints.
+        """
+        of_blocks = np.zeros(len(support), bool)
+        of_blocks[removed] = True
+        v = blocks.velocity.T * blocks.is_mobile
+        momentum = blocks.inertia * v - dt * self.forces[0]  # half a step before the last entries
+        kinetic = 0.5 * (v * momentum)[of_blocks].sum()
+        work = 0.5 * dt * (v * support)[~of_blocks].sum()
+        self.energy[DISCARDED] += kinetic - work
 
     @property
     def value(self) -> dict[str, float]:

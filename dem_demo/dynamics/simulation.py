@@ -8,11 +8,11 @@ rock is at rest. To remove a block at once would release its forces in one step,
 real excavation makes. The forces that the removed blocks exert on the others are therefore kept as
 a load (`Blocks.support`), which is ramped to zero over the release time of the stage. A step in
 which the blocks are removed changes no force on the rest. The joints of removed blocks end; their
-stored energy is entered as discarded, and the support does work as any other load does. A stage
-waits until the support of the previous stage is zero. The step that contains the given start time
-of a stage is divided there, so that the blocks are removed at this time. The rock is at rest when
-the velocity and the acceleration of most blocks are small: not of all, for a single loose stone
-that rattles must not delay an excavation for ever.
+stored energy and the kinetic energy of the blocks are entered as discarded, and the support does
+work as any other load does. A stage waits until the support of the previous stage is zero. The step
+that contains the given start time of a stage is divided there, so that the blocks are removed at
+this time. The rock is at rest when the velocity and the acceleration of most blocks are small: not
+of all, for a single loose stone that rattles must not delay an excavation for ever.
 """
 
 import io
@@ -294,11 +294,13 @@ class Simulation:
         blocks = self.blocks
         contacts = self.contacts
         is_removed = np.isin(contacts.block_a, removed) | np.isin(contacts.block_b, removed)
-        blocks.support += contacts.assemble_forces(
+        support = contacts.assemble_forces(
             len(blocks.support),
             (is_removed * contacts.area)[:, None] * self.joints.traction,
             is_removed * self.joints.stored_energy,
         )
+        blocks.support += support
+        self.energy_balance.discard_blocks(blocks, removed, support, self.dt)
         blocks.remove(removed)
         self.manager.needs_rebuild[removed] = True
         self.arrays.rebuild = 1

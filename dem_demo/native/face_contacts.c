@@ -3,8 +3,11 @@
  * Two faces that look at each other are in contact over their overlap: face A of block a is projected
  * on the plane of face B of block b and clipped by the edges of B. The contact points are the corners
  * of this polygon. Point i stands for the area (A_i-1 + A_i)/2 with A_i the triangle between corners
- * i, i + 1 and the centroid, so area and first moments of the polygon are exact. A point lies on face
- * A, and its closure is its depth below the plane of B.
+ * i, i + 1 and the centroid, so area and first moments of the polygon are exact. A point that is a
+ * corner of face B is fixed to block b, and its closure is its depth below the plane of A. All others
+ * lie on face A, and their closure is their depth below the plane of B. A corner therefore keeps its
+ * place in its block, and its depth, when the block slides: a point on the other face under it would
+ * change its depth by the slip times the tilt, which no force accounts for.
  *
  * Block a is the one with the lower number, whatever the blocks do: if the roles changed, so would the
  * sign of shear. Corners of the polygon that differ from a neighbour, or from the line between their
@@ -423,6 +426,18 @@ static void write_point(const dem_points *out, long long i, long long face_a, lo
   }
 }
 
+/* Number of the corner of a face g at a corner of the overlap of f and g, if no corner of f lies there;
+ * -1 for none. edges: corners of g in its plane; tie (m): distance that counts as zero. */
+static int corner_of_plane(const raised_face *f, double (*edges)[2], int m_edges, const double *here,
+                           double tie)
+{
+  for (int i = 0; i < f->m; i++)
+    if (hypot(f->corner[i][0] - here[0], f->corner[i][1] - here[1]) <= tie) return -1;
+  for (int i = 0; i < m_edges; i++)
+    if (hypot(edges[i][0] - here[0], edges[i][1] - here[1]) <= tie) return i;
+  return -1;
+}
+
 /* Contact points of face f of one block with face g of another, in whose plane they are clipped,
  * written from point `count` on. f_is_of_a: whether f belongs to the block with the lower number;
  * strip (m): width at an edge. Returns how many there are, or TOO_MANY_CORNERS. */
@@ -461,8 +476,16 @@ static long long touch(const dem_solids *s, long long f, long long g, int f_is_o
   overlap found;
   find_overlap(&face, edges, m_g, tie, strip, fade, &found);
   if (!(found.lowest < max_gap && found.lowest > -max_depth)) return 0;
+  const int is_flush = !(hypot(face.normal[0], face.normal[1]) > DEM_FLUSH_SINE);
   for (int i = 0; i < found.m; i++) {
     const double *here = found.polygon[i];
+    const int corner = is_flush ? corner_of_plane(&face, edges, m_g, here, tie) : -1;
+    if (corner >= 0) {
+      write_point(out, count + i, f_is_of_a ? f : g, f_is_of_a ? g : f, f_is_of_a,
+                  s->vertex + 3 * ring[corner], s->normal + 3 * f, s->vertex + 3 * ring_f[0],
+                  found.area[i]);
+      continue;
+    }
     const double up = found.height + found.gradient[0] * here[0] + found.gradient[1] * here[1];
     double point[3];
     for (int j = 0; j < 3; j++)
@@ -470,7 +493,7 @@ static long long touch(const dem_solids *s, long long f, long long g, int f_is_o
     write_point(out, count + i, f_is_of_a ? f : g, f_is_of_a ? g : f, !f_is_of_a, point, normal,
                 origin, found.area[i]);
   }
-  if (found.m > 0 && hypot(face.normal[0], face.normal[1]) > DEM_FLUSH_SINE) {
+  if (found.m > 0 && !is_flush) {
     double rate[MAX_CORNERS][6];
     find_area_rates(&face, edges, m_g, tie, strip, fade, found.m, rate);
     for (int i = 0; i < found.m && count + i < out->capacity; i++)

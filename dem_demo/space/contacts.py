@@ -9,7 +9,9 @@ which the resultant reaches the edge, is exact.
 A point lies on the face of block a, the block with the lower number, and its closure is its depth
 below the plane of the face of block b. The directions of the law are fixed to block b: the normal
 of its face, axis 2 (the rough direction of the joint) and axis 3, so the history of a joint rotates
-with the rock. The roles never change; they follow from the numbers of the blocks alone.
+with the rock. Where the point is a corner of the face of b, it belongs to b, and plane and
+directions to a: a corner keeps its depth when its block slides, also where the faces are tilted.
+The roles never change; they follow from the numbers of the blocks alone.
 
 Blocks whose faces are tilted by more than 2 degrees against each other stand on an edge or a
 corner, or two of their edges cross. Then the point belongs to the block that stands on the other

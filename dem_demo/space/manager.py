@@ -7,7 +7,8 @@ a twentieth of their skin anew, so polygons, points and areas follow.
 Identity. A joint remembers its history. A point of a rebuilt list continues the joint of the
 nearest point that the same two faces had before, in the frame of block a. Two new points may
 continue one old joint where a polygon gains a corner; the second gets a copy. Points lie on the
-face of their block, so closures do not jump. The roles of the blocks never change.
+face of their block, and corners stay with the block whose corner they are, so closures do not jump.
+The roles of the blocks never change.
 
 Seams. A block may slide from one block onto its coplanar neighbour. With new joints rough faces
 would drop there by their whole dilation, although the surface does not end at a seam. The points of
@@ -16,7 +17,7 @@ have the face of a or the face of b in common, their other faces are coplanar, a
 same way (`find_neighbours`). All other faces that meet in a run meet anew: their joints are unmated
 if their law has a mating length.
 
-Edges and corners. A block that stands on an edge or a corner has its points on the face of the
+Edges and corners. A block that stands on an edge or a corner has its points over the face of the
 other block, whichever of them is a (`native/face_contacts.c`). Where it rolls on, its points
 continue their joints. An overlap that no contact sees raises an error in a rebuild.
 """

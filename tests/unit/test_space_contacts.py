@@ -96,19 +96,46 @@ def test_roles_follow_the_numbers_of_blocks():
 
 
 @pytest.mark.parametrize("tilt", [0.5, 1.9])
-def test_points_of_tilted_faces_lie_on_face_a(tilt):
-    """Their closures are those of the tilted face, so a rebuild forgets nothing."""
+def test_points_of_tilted_faces_lie_on_one_of_them(tilt):
+    """A corner of the face of b is fixed to b, over the plane of a; others lie on the face of a.
+    Their closures are the depths of the tilted face, so a rebuild forgets nothing."""
     upper = box([1.0, 1.0, 1.0], [0.0, 0.0, 0.5])
     for solids, displaced in (((BASE, upper), 1), ((upper, BASE), 0)):
         surfaces = surfaces_of(*solids)
         move(surfaces, displaced, [0.0, 0.0, 0.0], [0.0, np.radians(tilt), 0.0])
         points = find_contacts(surfaces, np.full(2, REACH), 0.1)
-        normal = surfaces.normal[points.face_a]
-        start = np.array([surfaces.ring(face)[0] for face in points.face_a])
-        height = np.einsum("ki,ki->k", points.point - start, normal)
+        assert (points.plane_is_of_a == (displaced == 1)).all()  # corners of the smaller block
+        face = np.where(points.plane_is_of_a, points.face_b, points.face_a)
+        start = np.array([surfaces.ring(number)[0] for number in face])
+        height = np.einsum("ki,ki->k", points.point - start, surfaces.normal[face])
         assert np.abs(height).max() < 1e-14
         rows = rows_of(surfaces, points, [0.0, 1.0, 0.0])
         assert np.ptp(rows.closure) == pytest.approx(np.sin(np.radians(tilt)), rel=0.05)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_tilted_block_that_slides_keeps_the_depth_of_its_corners(order):
+    """On a base which it does not leave, and beyond whose edge half of it lies: the closures of its
+    corners, found anew after a slip, are the same, and so are their rates, none by the slip."""
+    upper = box([1.0, 1.0, 1.0], [0.0, 0.0, 0.5])
+    number = 1 - order
+    surfaces = surfaces_of(*((upper, BASE) if order else (BASE, upper)))
+    move(surfaces, number, [0.0, 0.0, -1e-4], np.radians([1.2, -0.7, 0.0]))
+    depth = []
+    for slip in ([0.0, 0.0, 0.0], [0.3, 0.2, 0.0], [1.4, -0.1, 0.0]):
+        move(surfaces, number, slip, [0.0, 0.0, 0.0])
+        points = find_contacts(surfaces, np.full(2, REACH), 0.1)
+        corners = surfaces.vertex[surfaces.first_vertex[number] : surfaces.first_vertex[number + 1]]
+        distance = np.linalg.norm(points.point[:, None] - corners, axis=2)
+        is_corner = distance.min(axis=1) < 1e-12
+        own = distance.argmin(axis=1)[is_corner]
+        depth.append(dict(zip(own.tolist(), points.closure[is_corner], strict=True)))
+        rows = rows_of(surfaces, points, [0.0, 1.0, 0.0])
+        slides = rows.kinematics[is_corner, 0, 6 * number : 6 * number + 2]
+        assert slides == pytest.approx(np.zeros_like(slides), abs=1e-15)
+    assert [len(found) for found in depth] == [4, 4, 2]
+    for found in depth[1:]:
+        assert found == pytest.approx({corner: depth[0][corner] for corner in found}, abs=1e-15)
 
 
 def test_the_number_of_points_does_not_depend_on_rounding():

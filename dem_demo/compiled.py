@@ -5,12 +5,13 @@ the number of contacts changes there are new arrays, and a new `StepArrays` with
 """
 
 import ctypes
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from jointlaw.kernels.threads import run_on_threads
 from jointlaw.native.build import Compiler
 
 from .native import build, layout
@@ -24,11 +25,14 @@ POINTER = ctypes.c_void_p
 FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "locate_contacts": ([], None),
     "next_contacts": ([POINTER] * 2, None),
-    "update_contacts": ([], INTEGER),
+    "update_contacts": ([INTEGER] * 2, INTEGER),
     "find_candidates": ([INTEGER, *[POINTER] * 4, INTEGER, *[POINTER] * 4], INTEGER),
     "compute_rates": ([], None),
     "set_increments": ([DOUBLE], None),
+    "check_speeds": ([DOUBLE], None),
     "move_blocks": ([DOUBLE], None),
+    "run_phase": ([DOUBLE, INTEGER], None),
+    "add_energies": ([DOUBLE], None),
     "read_joints": ([], None),
     "compute_forces": ([DOUBLE], None),
     "finish_step": ([DOUBLE], None),
@@ -39,7 +43,7 @@ FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "place_solids": ([], None),
     "near_pairs": ([POINTER] * 2 + [INTEGER, POINTER], INTEGER),
     "separations": ([INTEGER, POINTER, DOUBLE, POINTER], None),
-    "update_face_points": ([], INTEGER),
+    "update_face_points": ([INTEGER] * 2, INTEGER),
     "face_contacts": ([INTEGER, *[POINTER] * 6], INTEGER),
 }
 
@@ -75,9 +79,61 @@ class Arrays(ctypes.Structure):
 
 
 class StepArrays(Arrays):
-    """`dem_step` of layout.h: numbers of a step, and addresses of its arrays."""
+    """`dem_step` of layout.h: numbers of a step, and addresses of its arrays.
+
+    threads: that share a step, see `divide`.
+    """
 
     _fields_ = [(name, field.ctype) for name, field in layout.STEP.items()]
+    threads = 1
+
+    def divide(self, block_a: np.ndarray, block_b: np.ndarray, threads: int = 1) -> None:
+        """Divide the blocks among threads, by the contact points (k,) of their two blocks.
+
+        The results of a step do not depend on the number of threads, which may exceed one only for
+        a geometry that has parts.
+        """
+        n, k, size = self.n_blocks, self.n_contacts, layout.BLOCKS_PER_PART
+        self.threads = threads
+        points = np.bincount(block_a, minlength=n) + np.bincount(block_b, minlength=n)
+        part = np.arange(0, n + size, size)  # first block of each part
+        before = np.concatenate([[0], np.cumsum(points + 1)])[np.minimum(part, n)]
+        shares = np.arange(1, threads) / threads * before[-1]
+        inner = part[np.searchsorted(before, shares)]
+        first_block = np.concatenate([[0], inner, [n]]).astype(np.int64)
+        self.n_ranges = threads
+        self.bind(
+            first_block=np.minimum(first_block, n),
+            point_forces=np.zeros((k, 2, self.dim)),
+            block_sums=np.zeros((len(part), len(layout.BLOCK_SUMS))),
+            point_sums=np.zeros((k // layout.POINTS_PER_PART + 1, len(layout.POINT_SUMS))),
+        )
+
+    def move_blocks(self, dt: float) -> None:
+        """Move the blocks by a step (s), update their points, and set the increments of the law."""
+        if self.threads == 1:
+            self.call("move_blocks", dt)
+            return
+        self.call("check_speeds", dt)
+        if self.too_fast < 0:
+            self._run_phase("move", dt)
+            self._run_phase("update", dt)
+
+    def finish_step(self, dt: float) -> None:
+        """Compute forces, energies and velocities after the law has advanced by a step (s)."""
+        if self.threads == 1:
+            self.call("finish_step", dt)
+            return
+        self.stiffened = 0
+        self._run_phase("finish_points", dt)
+        self._run_phase("finish_blocks", dt)
+        self.call("add_energies", dt)
+
+    def _run_phase(self, name: str, dt: float) -> None:
+        """Run a phase of the step on all threads."""
+        self.next_part = 0
+        work = partial(self.call, "run_phase", dt, layout.PHASES.index(name))
+        run_on_threads(work, self.threads)
 
 
 class CornerArrays(Arrays):

@@ -130,7 +130,7 @@ class ContactManager:
         """
         arrays = self.contacts.corner_arrays
         arrays.bind(motion=motion, needs_rebuild=self.needs_rebuild)
-        arrays.call("update_contacts")
+        arrays.call("update_contacts", 0, arrays.n_contacts)
 
     def rebuild(
         self, motion: np.ndarray, candidates: np.ndarray, keep_closure: bool = True

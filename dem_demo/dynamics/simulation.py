@@ -235,7 +235,7 @@ class Simulation:
         drives = self.blocks.drives
         drives.aim[:] = drives.velocity(self.time, self.dt)
         self.energy_balance.energy[BOLTS] = self.blocks.bolts.pull()
-        self.arrays.call("finish_step", self.dt)
+        self.arrays.finish_step(self.dt)
         if self.arrays.stiffened:
             self._check_time_step()
         if self.steps_since_change % CHECK_INTERVAL == 0:
@@ -247,11 +247,11 @@ class Simulation:
         While a block is too fast for the neighbour list, the time step is halved and the move
         repeated; raises SceneError when it may not be halved any more.
         """
-        self.arrays.call("move_blocks", self.dt)
+        self.arrays.move_blocks(self.dt)
         while self.arrays.too_fast >= 0:
             if not self._halve_time_step():
                 self.blocks.refuse_speed(self.arrays.too_fast, self.dt)
-            self.arrays.call("move_blocks", self.dt)
+            self.arrays.move_blocks(self.dt)
 
     def _refuse_overlap(self, row: int) -> None:
         contacts = self.contacts
@@ -509,8 +509,14 @@ class Simulation:
         )  # fmt: skip
         self._bind_geometry(arrays)
         joints.bind(arrays)
+        arrays.divide(self.contacts.block_a, self.contacts.block_b, self._count_threads())
         arrays.call("compute_rates")
         self.arrays = arrays
+
+    def _count_threads(self) -> int:
+        """Number of threads that share a step around the law: one in the plane, where a contact may
+        take the place of another."""
+        return 1
 
     def _bind_geometry(self, arrays: StepArrays) -> None:
         """Bind the geometry of the contacts, and the function that updates it."""

@@ -11,6 +11,13 @@
  *   dem_finish_step   tractions, forces, energies, velocities
  * docs/blocks.md describes the method.
  *
+ * Threads. Both functions consist of phases (DEM_MOVE and so on, layout.py), which Python may run on
+ * several threads instead: each thread calls dem_run_phase, and takes the next part of the blocks or
+ * of the points until none is left. The results are the same bits for any number of threads: a
+ * position, a closure or the force of a point is computed by one thread; the forces on a block are
+ * summed by one thread in the order of the points; energies are summed for parts of a fixed size,
+ * and then over the parts in their order.
+ *
  * Functions with the arguments dim and dof are inlined with constants, once for the plane and once
  * for space.
  */
@@ -19,7 +26,7 @@
 #include "export.h"
 #include "layout.h"
 
-enum { MAX_DIM = 3, MAX_MIDPOINT_ITERATIONS = 20 };
+enum { MAX_MIDPOINT_ITERATIONS = 20 };
 static const double MIDPOINT_TOLERANCE = 1e-15; /* of the angular velocity */
 
 /* Hash of the sources that this library was built from */
@@ -51,14 +58,23 @@ INLINE void compute_rates(const dem_step *sim, long long i, const int dim, const
   }
 }
 
-INLINE void set_increments(dem_step *sim, double dt, const int dim, const int dof)
+/* Let a number that several threads write be at least `value` */
+static void raise_to(long long *number, long long value)
 {
-  sim->too_deep = -1;
-  for (long long i = 0; i < sim->n_contacts; i++) {
+  long long present = __atomic_load_n(number, __ATOMIC_RELAXED);
+  while (present < value && !__atomic_compare_exchange_n(number, &present, value, 0,
+                                                         __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+  }
+}
+
+INLINE void set_increments(dem_step *sim, double dt, long long begin, long long end, const int dim,
+                           const int dof)
+{
+  for (long long i = begin; i < end; i++) {
     const double closure = sim->closure[i], offset = sim->closure_offset[i];
     const double limit =
         smaller(sim->max_overlap[sim->block_a[i]], sim->max_overlap[sim->block_b[i]]);
-    if (sim->area[i] > 0.0 && closure > limit) sim->too_deep = i;
+    if (sim->area[i] > 0.0 && closure > limit) raise_to(&sim->too_deep, i);
     const double joint_closure = closure - (closure > 0.0 || offset < 0.0 ? offset : 0.0);
     double *d = sim->laws[sim->law[i]].d + dim * sim->place[i];
     compute_rates(sim, i, dim, dof);
@@ -72,8 +88,9 @@ INLINE void set_increments(dem_step *sim, double dt, const int dim, const int do
  * their laws; notes a contact that overlaps too much */
 EXPORT void dem_set_increments(dem_step *sim, double dt)
 {
-  if (sim->dof == 3) set_increments(sim, dt, 2, 3);
-  else set_increments(sim, dt, 3, 6);
+  sim->too_deep = -1;
+  if (sim->dof == 3) set_increments(sim, dt, 0, sim->n_contacts, 2, 3);
+  else set_increments(sim, dt, 0, sim->n_contacts, 3, 6);
 }
 
 /* Rates of all contact points */
@@ -112,22 +129,31 @@ static void rotate_axes(double *axes, const double *angles)
   for (int c = 0; c < 9; c++) axes[c] = corrected[c];
 }
 
-INLINE void move_blocks(dem_step *sim, double dt, const int dim, const int dof)
+/* Note a block that is too fast for a step, before any has moved */
+EXPORT void dem_check_speeds(dem_step *sim, double dt)
 {
-  const long long n = sim->n_blocks;
+  const long long n = sim->n_blocks, dof = sim->dof;
   sim->too_fast = -1;
-  sim->rebuild = 0;
   for (long long i = 0; i < n; i++) {
     const double *v = sim->velocity + i;
     double speed = 0.0, spin = 0.0;
-    for (int j = 0; j < dim; j++) speed += fabs(v[j * n]);
-    for (int j = dim; j < dof; j++) spin += fabs(v[j * n]);
+    for (long long j = 0; j < sim->dim; j++) speed += fabs(v[j * n]);
+    for (long long j = sim->dim; j < dof; j++) spin += fabs(v[j * n]);
     speed += spin * sim->radius[i];
     const int is_slow = speed * dt < sim->max_skin_per_step * sim->skin[i]; /* false for NaN */
     if (sim->is_mobile[i] && !is_slow) sim->too_fast = i;
   }
-  if (sim->too_fast >= 0) return;
-  for (long long i = 0; i < n; i++) {
+  sim->too_deep = -1;
+  sim->transferred = 0;
+  sim->rebuild = 0;
+}
+
+/* Positions of blocks `begin` to `end`; notes whether contacts must be searched again */
+INLINE void move_blocks(dem_step *sim, double dt, long long begin, long long end, const int dim,
+                        const int dof)
+{
+  const long long n = sim->n_blocks;
+  for (long long i = begin; i < end; i++) {
     double *m = sim->motion + i, angles[3], squares = 0.0, rotation = 0.0;
     if (!sim->is_mobile[i]) continue;
     for (int j = 0; j < dof; j++) {
@@ -143,29 +169,16 @@ INLINE void move_blocks(dem_step *sim, double dt, const int dim, const int dof)
     }
     if (dof == 6) rotate_axes(sim->axes + 9 * i, angles);
     const double distance = sqrt(squares) + rotation * sim->radius[i];
-    if (distance > sim->max_skin_until_rebuild * sim->skin[i]) sim->rebuild = 1;
+    if (distance > sim->max_skin_until_rebuild * sim->skin[i]) raise_to(&sim->rebuild, 1);
   }
-  sim->transferred = sim->update_geometry(sim->geometry);
-  for (long long i = 0; i < n && sim->transferred; i++) sim->rebuild |= sim->needs_rebuild[i];
-  set_increments(sim, dt, dim, dof);
-}
-
-/* Move the blocks, update their contact points, and set the increments of the law.
- *
- * Notes a block that is too fast, before any has moved, and whether contacts must be searched
- * again. */
-EXPORT void dem_move_blocks(dem_step *sim, double dt)
-{
-  if (sim->dof == 3) move_blocks(sim, dt, 2, 3);
-  else move_blocks(sim, dt, 3, 6);
 }
 
 /* ------------------------------------------------------------------------- after the law */
 
-INLINE void read_joints(dem_step *sim, const int dim)
+INLINE void read_joints(dem_step *sim, long long begin, long long end, const int dim)
 {
   const long long k = sim->n_contacts;
-  for (long long i = 0; i < k; i++) {
+  for (long long i = begin; i < end; i++) {
     const dem_law_joints *law = sim->laws + sim->law[i];
     const double *F = law->F + dim * sim->place[i];
     const double *measures = law->measures + (DEM_MEASURES + dim) * sim->place[i];
@@ -183,8 +196,8 @@ INLINE void read_joints(dem_step *sim, const int dim)
 /* Results of the law for each contact: traction, displacement since first touch, and the others */
 EXPORT void dem_read_joints(dem_step *sim)
 {
-  if (sim->dim == 2) read_joints(sim, 2);
-  else read_joints(sim, 3);
+  if (sim->dim == 2) read_joints(sim, 0, sim->n_contacts, 2);
+  else read_joints(sim, 0, sim->n_contacts, 3);
 }
 
 /* Upper bound of the stiffness (Pa/m) of contact i at its normal stress, by linear interpolation on
@@ -207,25 +220,22 @@ static double stiffness_bound(const dem_step *sim, long long i)
   return y[low] + (y[high] - y[low]) / (x[high] - x[low]) * (stress - x[low]);
 }
 
-/* Forces of the joint of contact i on its blocks, and of its dashpots; returns its stiffness (N/m).
- *
- * The rows that turn motions into closure and shears turn their forces into forces on the motions. A
- * change of the area costs the stored energy. */
-INLINE double apply_joint(const dem_step *sim, long long i, double *total, double *damped,
-                          const int dim, const int dof)
+/* Forces (N) of the joint and the dashpots of contact i along closure and shears; returns its
+ * stiffness (N/m) */
+INLINE double find_point_forces(const dem_step *sim, long long i, const int dim)
 {
   const long long k = sim->n_contacts;
-  const long long a = sim->block_a[i], b = sim->block_b[i];
   const double area = sim->area[i];
   const double stiffness = stiffness_bound(sim, i) * area;
-  const double energy = sim->measures[DEM_STORED_ENERGY * k + i];
   const double damage = sim->measures[DEM_DAMAGE * k + i];
-  const double *row = sim->kinematics + 2 * dim * dof * i;
-  const double *area_gradient = sim->area_gradient + 2 * dof * i;
   const double *rates = sim->rates + dim * i;
-  double joint[MAX_DIM], dashpot[MAX_DIM] = {0.0};
-  for (int c = 0; c < dim; c++) joint[c] = area * sim->traction[dim * i + c];
-  const double inverse_mass = sim->inverse_mass[a] + sim->inverse_mass[b];
+  double *joint = sim->point_forces + 2 * dim * i, *dashpot = joint + dim;
+  for (int c = 0; c < dim; c++) {
+    joint[c] = area * sim->traction[dim * i + c];
+    dashpot[c] = 0.0;
+  }
+  const double inverse_mass =
+      sim->inverse_mass[sim->block_a[i]] + sim->inverse_mass[sim->block_b[i]];
   if (inverse_mass > 0.0 && stiffness > 0.0) {
     /* 2 sqrt(stiffness * reduced mass), with half a joint for each block */
     const double critical = 2.0 * sqrt(stiffness * (0.5 / inverse_mass));
@@ -236,45 +246,79 @@ INLINE double apply_joint(const dem_step *sim, long long i, double *total, doubl
                1.0 - damage);
     for (int c = 1; c < dim; c++) dashpot[c] = sim->dashpot_shear * critical * stick * rates[c];
   }
-  for (int side = 0; side < 2; side++, row += dof, area_gradient += dof) {
-    const long long at = dof * (side ? b : a);
-    for (int j = 0; j < dof; j++) {
-      double of_joint = 0.0, of_dashpot = 0.0;
-      for (int c = 0; c < dim; c++) {
-        of_joint += joint[c] * row[2 * dof * c + j];
-        of_dashpot += dashpot[c] * row[2 * dof * c + j];
-      }
-      total[at + j] -= of_joint + energy * area_gradient[j];
-      damped[at + j] -= of_dashpot;
-    }
-  }
   return stiffness;
 }
 
-INLINE void compute_forces(dem_step *sim, double dt, const int dim, const int dof)
+/* Forces of points `begin` to `end`; counts the joints that are stiffer than the time step allows */
+INLINE void find_forces_of_points(dem_step *sim, long long begin, long long end, const int dim)
+{
+  long long stiffened = 0;
+  for (long long i = begin; i < end; i++)
+    stiffened += find_point_forces(sim, i, dim) > sim->checked_stiffness[i];
+  __atomic_fetch_add(&sim->stiffened, stiffened, __ATOMIC_RELAXED);
+}
+
+/* Add the forces of contact i to those on one of its blocks. side: 0 for block a, 1 for b.
+ *
+ * The rows that turn motions into closure and shears turn their forces into forces on the motions. A
+ * change of the area costs the stored energy. */
+INLINE void add_point_forces(const dem_step *sim, long long i, int side, double *total,
+                             double *damped, const int dim, const int dof)
+{
+  const double energy = sim->measures[DEM_STORED_ENERGY * sim->n_contacts + i];
+  const double *row = sim->kinematics + dof * (2 * dim * i + side);
+  const double *area_gradient = sim->area_gradient + dof * (2 * i + side);
+  const double *joint = sim->point_forces + 2 * dim * i, *dashpot = joint + dim;
+  for (int j = 0; j < dof; j++) {
+    double of_joint = 0.0, of_dashpot = 0.0;
+    for (int c = 0; c < dim; c++) {
+      of_joint += joint[c] * row[2 * dof * c + j];
+      of_dashpot += dashpot[c] * row[2 * dof * c + j];
+    }
+    total[j] -= of_joint + energy * area_gradient[j];
+    damped[j] -= of_dashpot;
+  }
+}
+
+/* Forces on blocks `begin` to `end`, whose points are summed in their order */
+INLINE void find_forces_on_blocks(dem_step *sim, double dt, long long begin, long long end,
+                                  const int dim, const int dof)
 {
   const long long n = sim->n_blocks, size = dof * n;
   double *total = sim->forces, *damped = total + size, *driven = damped + size;
-  for (long long i = 0; i < 2 * size; i++) sim->previous_forces[i] = damped[i];
-  for (long long i = 0; i < 3 * size; i++) total[i] = 0.0;
-  sim->stiffened = 0;
-  for (long long i = 0; i < sim->n_contacts; i++)
-    sim->stiffened += apply_joint(sim, i, total, damped, dim, dof) > sim->checked_stiffness[i];
-  for (long long i = 0; i < n; i++)
-    for (int j = 0; j < dof; j++) {
-      const long long at = dof * i + j;
-      if (!sim->is_mobile[i]) total[at] = damped[at] = 0.0;
-      else
-        total[at] = (total[at] + damped[at]) +
-                    (sim->gravity[at] + sim->loads[at] + sim->bolt_forces[at]);
-    }
+  for (long long at = dof * begin; at < dof * end; at++) {
+    sim->previous_forces[at] = damped[at];
+    sim->previous_forces[size + at] = driven[at];
+    total[at] = damped[at] = driven[at] = 0.0;
+  }
+  for (long long i = 0; i < sim->n_contacts; i++) {
+    const long long a = sim->block_a[i], b = sim->block_b[i];
+    if (a >= begin && a < end && sim->is_mobile[a])
+      add_point_forces(sim, i, 0, total + dof * a, damped + dof * a, dim, dof);
+    if (b >= begin && b < end && sim->is_mobile[b])
+      add_point_forces(sim, i, 1, total + dof * b, damped + dof * b, dim, dof);
+  }
+  for (long long i = begin; i < end; i++) {
+    if (!sim->is_mobile[i]) continue;
+    for (long long at = dof * i; at < dof * (i + 1); at++)
+      total[at] =
+          (total[at] + damped[at]) + (sim->gravity[at] + sim->loads[at] + sim->bolt_forces[at]);
+  }
   for (long long i = 0; i < sim->n_driven; i++) {
     const long long block = sim->driven_block[i], axis = sim->driven_axis[i];
     const long long at = dof * block + axis;
+    if (block < begin || block >= end) continue;
     const double change = sim->driven_velocity[i] - sim->motion[(dof + axis) * n + block];
     driven[at] = sim->inertia[at] * change / dt - total[at];
     total[at] += driven[at];
   }
+}
+
+INLINE void compute_forces(dem_step *sim, double dt, const int dim, const int dof)
+{
+  sim->stiffened = 0;
+  find_forces_of_points(sim, 0, sim->n_contacts, dim);
+  find_forces_on_blocks(sim, dt, 0, sim->n_blocks, dim, dof);
 }
 
 /* Forces on all blocks: joints, dashpots, weight and loads, and the reactions of drives that bring
@@ -286,32 +330,14 @@ EXPORT void dem_compute_forces(dem_step *sim, double dt)
   else compute_forces(sim, dt, 3, 6);
 }
 
-/* Add a step to the energy balance: dem_demo/dynamics/energy_balance.py explains it */
-INLINE void add_energies(dem_step *sim, double dt, const int dof)
+/* Sums of the energies of a part of the points */
+static void sum_energies_of_points(dem_step *sim, long long part)
 {
-  const long long n = sim->n_blocks, k = sim->n_contacts;
-  double *energy = sim->energy;
-  double kinetic = 0.0, gravity_work = 0.0, load_work = 0.0, turned_over = 0.0;
+  const long long begin = part * DEM_POINTS_PER_PART, k = sim->n_contacts;
+  const long long end = begin + DEM_POINTS_PER_PART < k ? begin + DEM_POINTS_PER_PART : k;
+  double *sums = sim->point_sums + DEM_POINT_SUMS * part;
   double stored = 0.0, friction = 0.0;
-  double power[2] = {0.0, 0.0}; /* twice that of dashpots and drives */
-  for (long long i = 0; i < n; i++) {
-    double gravity_power = 0.0, load_power = 0.0;
-    if (!sim->is_mobile[i]) continue;
-    for (int j = 0; j < dof; j++) {
-      const long long at = dof * i + j;
-      const double v = sim->motion[(dof + j) * n + i];
-      kinetic += v * (sim->inertia[at] * v + dt * sim->forces[at]);
-      gravity_power += sim->gravity[at] * v;
-      load_power += sim->loads[at] * v;
-      for (int p = 0; p < 2; p++)
-        power[p] +=
-            (sim->previous_forces[dof * p * n + at] + sim->forces[dof * (p + 1) * n + at]) * v;
-    }
-    gravity_work += dt * gravity_power;
-    load_work += dt * load_power;
-    turned_over += fabs(dt * gravity_power) + fabs(dt * load_power);
-  }
-  for (long long i = 0; i < k; i++) {
+  for (long long i = begin; i < end; i++) {
     /* a joint loses its traction at the end of the step, when it acts on the area of that time */
     const double area = sim->booked_area[i] = sim->area[i];
     const double dissipated = sim->measures[DEM_DISSIPATED_ENERGY * k + i];
@@ -319,13 +345,54 @@ INLINE void add_energies(dem_step *sim, double dt, const int dof)
     friction += area * (dissipated - sim->booked_dissipation[i]);
     sim->booked_dissipation[i] = dissipated;
   }
-  energy[DEM_KINETIC] = 0.5 * kinetic;
-  energy[DEM_POTENTIAL] -= gravity_work;
-  energy[DEM_STORED] = stored;
-  energy[DEM_FRICTION] += friction;
-  energy[DEM_DASHPOTS] -= 0.5 * dt * power[0];
-  energy[DEM_EXTERNAL_WORK] += 0.5 * dt * power[1] + load_work;
-  energy[DEM_TURNOVER] += turned_over + fabs(0.5 * dt * power[1]);
+  sums[DEM_ELASTIC_ENERGY] = stored;
+  sums[DEM_FRICTION_WORK] = friction;
+}
+
+/* Sums of the energies of a part of the blocks */
+INLINE void sum_energies_of_blocks(dem_step *sim, double dt, long long part, const int dof)
+{
+  const long long n = sim->n_blocks, begin = part * DEM_BLOCKS_PER_PART;
+  const long long end = begin + DEM_BLOCKS_PER_PART < n ? begin + DEM_BLOCKS_PER_PART : n;
+  double *sums = sim->block_sums + DEM_BLOCK_SUMS * part;
+  for (int s = 0; s < DEM_BLOCK_SUMS; s++) sums[s] = 0.0;
+  for (long long i = begin; i < end; i++) {
+    double gravity_power = 0.0, load_power = 0.0;
+    if (!sim->is_mobile[i]) continue;
+    for (int j = 0; j < dof; j++) {
+      const long long at = dof * i + j;
+      const double v = sim->motion[(dof + j) * n + i];
+      sums[DEM_TWICE_KINETIC] += v * (sim->inertia[at] * v + dt * sim->forces[at]);
+      gravity_power += sim->gravity[at] * v;
+      load_power += sim->loads[at] * v;
+      for (int p = 0; p < 2; p++)
+        sums[DEM_DASHPOT_POWER + p] +=
+            (sim->previous_forces[dof * p * n + at] + sim->forces[dof * (p + 1) * n + at]) * v;
+    }
+    sums[DEM_GRAVITY_WORK] += dt * gravity_power;
+    sums[DEM_LOAD_WORK] += dt * load_power;
+    sums[DEM_ABSOLUTE_WORK] += fabs(dt * gravity_power) + fabs(dt * load_power);
+  }
+}
+
+static long long parts_of(long long count, long long size) { return (count + size - 1) / size; }
+
+/* Add the sums of a step to the energy balance: dem_demo/dynamics/energy_balance.py explains it */
+EXPORT void dem_add_energies(dem_step *sim, double dt)
+{
+  double of_blocks[DEM_BLOCK_SUMS] = {0.0}, of_points[DEM_POINT_SUMS] = {0.0}, *energy = sim->energy;
+  for (long long part = 0; part < parts_of(sim->n_blocks, DEM_BLOCKS_PER_PART); part++)
+    for (int s = 0; s < DEM_BLOCK_SUMS; s++) of_blocks[s] += sim->block_sums[DEM_BLOCK_SUMS * part + s];
+  for (long long part = 0; part < parts_of(sim->n_contacts, DEM_POINTS_PER_PART); part++)
+    for (int s = 0; s < DEM_POINT_SUMS; s++) of_points[s] += sim->point_sums[DEM_POINT_SUMS * part + s];
+  const double drive_work = 0.5 * dt * of_blocks[DEM_DRIVE_POWER];
+  energy[DEM_KINETIC] = 0.5 * of_blocks[DEM_TWICE_KINETIC];
+  energy[DEM_POTENTIAL] -= of_blocks[DEM_GRAVITY_WORK];
+  energy[DEM_STORED] = of_points[DEM_ELASTIC_ENERGY];
+  energy[DEM_FRICTION] += of_points[DEM_FRICTION_WORK];
+  energy[DEM_DASHPOTS] -= 0.5 * dt * of_blocks[DEM_DASHPOT_POWER];
+  energy[DEM_EXTERNAL_WORK] += drive_work + of_blocks[DEM_LOAD_WORK];
+  energy[DEM_TURNOVER] += of_blocks[DEM_ABSOLUTE_WORK] + fabs(drive_work);
 }
 
 /* Change of the angular velocity of block i in space by its gyroscopic moment within dt, after the
@@ -359,28 +426,109 @@ static void add_gyroscopic_moment(const dem_step *sim, long long i, double dt)
   for (int j = 0; j < 3; j++) sim->velocity[(3 + j) * n + i] = now[j];
 }
 
-INLINE void finish_step(dem_step *sim, double dt, const int dim, const int dof)
+/* Results of the law, forces and energies of a part of the points */
+INLINE void finish_points(dem_step *sim, long long part, const int dim)
+{
+  const long long begin = part * DEM_POINTS_PER_PART, k = sim->n_contacts;
+  const long long end = begin + DEM_POINTS_PER_PART < k ? begin + DEM_POINTS_PER_PART : k;
+  read_joints(sim, begin, end, dim);
+  find_forces_of_points(sim, begin, end, dim);
+  sum_energies_of_points(sim, part);
+  /* a contact that has opened has no offset when it touches again */
+  for (long long i = begin; i < end; i++)
+    if (sim->closure[i] <= 0.0 && sim->closure_offset[i] > 0.0) sim->closure_offset[i] = 0.0;
+}
+
+/* Forces, energies and velocities of blocks `begin` to `end`, a number of whole parts */
+INLINE void finish_blocks(dem_step *sim, double dt, long long begin, long long end, const int dim,
+                          const int dof)
 {
   const long long n = sim->n_blocks;
-  read_joints(sim, dim);
-  compute_forces(sim, dt, dim, dof);
-  add_energies(sim, dt, dof);
-  /* a contact that has opened has no offset when it touches again */
-  for (long long i = 0; i < sim->n_contacts; i++)
-    if (sim->closure[i] <= 0.0 && sim->closure_offset[i] > 0.0) sim->closure_offset[i] = 0.0;
-  for (long long i = 0; i < n; i++) {
+  find_forces_on_blocks(sim, dt, begin, end, dim, dof);
+  for (long long part = begin / DEM_BLOCKS_PER_PART; part < parts_of(end, DEM_BLOCKS_PER_PART); part++)
+    sum_energies_of_blocks(sim, dt, part, dof);
+  for (long long i = begin; i < end; i++) {
     if (!sim->is_mobile[i]) continue;
     for (int j = 0; j < dof; j++)
       sim->velocity[j * n + i] += dt * sim->forces[dof * i + j] / sim->inertia[dof * i + j];
     if (dof == 6) add_gyroscopic_moment(sim, i, dt);
   }
-  for (long long i = 0; i < sim->n_driven && dof == 6; i++) /* drives bear gyroscopic moments */
-    sim->velocity[sim->driven_axis[i] * n + sim->driven_block[i]] = sim->driven_velocity[i];
+  for (long long i = 0; i < sim->n_driven && dof == 6; i++) { /* drives bear gyroscopic moments */
+    const long long block = sim->driven_block[i];
+    if (block >= begin && block < end)
+      sim->velocity[sim->driven_axis[i] * n + block] = sim->driven_velocity[i];
+  }
+}
+
+/* ------------------------------------------------------------------------------ phases */
+
+/* Number of the parts of a phase */
+static long long count_parts(const dem_step *sim, long long phase)
+{
+  switch (phase) {
+  case DEM_MOVE: return parts_of(sim->n_blocks, DEM_BLOCKS_PER_PART);
+  case DEM_FINISH_BLOCKS: return sim->n_ranges;
+  default: return parts_of(sim->n_contacts, DEM_POINTS_PER_PART);
+  }
+}
+
+INLINE void run_part(dem_step *sim, double dt, long long phase, long long part, const int dim,
+                     const int dof)
+{
+  const long long size = phase == DEM_MOVE ? DEM_BLOCKS_PER_PART : DEM_POINTS_PER_PART;
+  const long long count = phase == DEM_MOVE ? sim->n_blocks : sim->n_contacts;
+  const long long begin = part * size, end = begin + size < count ? begin + size : count;
+  switch (phase) {
+  case DEM_MOVE: move_blocks(sim, dt, begin, end, dim, dof); break;
+  case DEM_UPDATE:
+    if (sim->has_parts) sim->update_geometry(sim->geometry, begin, end);
+    set_increments(sim, dt, begin, end, dim, dof);
+    break;
+  case DEM_FINISH_POINTS: finish_points(sim, part, dim); break;
+  case DEM_FINISH_BLOCKS:
+    finish_blocks(sim, dt, sim->first_block[part], sim->first_block[part + 1], dim, dof);
+    break;
+  }
+}
+
+/* Run a phase of a step. Several threads may call this for the same phase: each takes the next part
+ * until none is left. `next_part` must be 0 before. */
+EXPORT void dem_run_phase(dem_step *sim, double dt, long long phase)
+{
+  const long long parts = count_parts(sim, phase);
+  for (long long part;
+       (part = __atomic_fetch_add(&sim->next_part, 1, __ATOMIC_RELAXED)) < parts;) {
+    if (sim->dof == 3) run_part(sim, dt, phase, part, 2, 3);
+    else run_part(sim, dt, phase, part, 3, 6);
+  }
+}
+
+static void run_phase_alone(dem_step *sim, double dt, long long phase)
+{
+  sim->next_part = 0;
+  dem_run_phase(sim, dt, phase);
+}
+
+/* Move the blocks, update their contact points, and set the increments of the law.
+ *
+ * Notes a block that is too fast, before any has moved, and whether contacts must be searched
+ * again. */
+EXPORT void dem_move_blocks(dem_step *sim, double dt)
+{
+  dem_check_speeds(sim, dt);
+  if (sim->too_fast >= 0) return;
+  run_phase_alone(sim, dt, DEM_MOVE);
+  if (!sim->has_parts) sim->transferred = sim->update_geometry(sim->geometry, 0, sim->n_contacts);
+  for (long long i = 0; i < sim->n_blocks && sim->transferred; i++)
+    sim->rebuild |= sim->needs_rebuild[i];
+  run_phase_alone(sim, dt, DEM_UPDATE);
 }
 
 /* Results of the law, forces, energies, and the velocities of the next step */
 EXPORT void dem_finish_step(dem_step *sim, double dt)
 {
-  if (sim->dof == 3) finish_step(sim, dt, 2, 3);
-  else finish_step(sim, dt, 3, 6);
+  sim->stiffened = 0;
+  run_phase_alone(sim, dt, DEM_FINISH_POINTS);
+  run_phase_alone(sim, dt, DEM_FINISH_BLOCKS);
+  dem_add_energies(sim, dt);
 }

@@ -260,13 +260,14 @@ static void request_rebuild(dem_corners *plane, long long i)
 
 /* All contacts at the present motion. A corner that has left its range goes on to the corner or edge
  * that comes next, and its contact goes with it. Where another contact may begin beside it, the
- * contacts of its blocks are searched again. Returns the number of contacts that went on. */
-EXPORT long long dem_update_contacts(void *corners)
+ * contacts of its blocks are searched again. begin, end: all contacts, 0 to k; one contact may go on
+ * to the place of another. Returns the number of contacts that went on. */
+EXPORT long long dem_update_contacts(void *corners, long long begin, long long end)
 {
   dem_corners *plane = (dem_corners *) corners;
   long long n_rows = 0;
   locate_corners(plane);
-  for (long long i = 0; i < plane->n_contacts; i++) {
+  for (long long i = begin; i < end; i++) {
     locate_contact(plane, i);
     plane->previous_length[i] = plane->length[i];
     if (is_out_of_range(plane, i)) plane->work_rows[n_rows++] = i;

@@ -57,11 +57,13 @@ static void fill_row(const double *direction, const double *axes, const double *
   }
 }
 
-/* Closure and kinematics of all points at the present places; no contact goes on to another face */
-EXPORT long long dem_update_face_points(dem_face_points *points)
+/* Closure and kinematics of points `begin` to `end` at the present places; no contact goes on to
+ * another face */
+EXPORT long long dem_update_face_points(void *geometry, long long begin, long long end)
 {
+  const dem_face_points *points = (const dem_face_points *) geometry;
   const long long n = points->n_blocks;
-  for (long long i = 0; i < points->n_points; i++) {
+  for (long long i = begin; i < end; i++) {
     const int of_a = points->plane_is_of_a[i]; /* the plane */
     const long long a = points->block_a[i], b = points->block_b[i];
     const long long own = of_a ? b : a, other = of_a ? a : b;

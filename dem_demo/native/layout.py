@@ -21,6 +21,20 @@ ENERGIES = (
     "external_work",
     "turnover",
 )
+# Phases of a step, which several threads may share; blocks.c explains them
+PHASES = ("move", "update", "finish_points", "finish_blocks")
+BLOCKS_PER_PART = 16  # of a phase; energies are summed for each part
+POINTS_PER_PART = 512
+# Sums over a part of the blocks, of the points, for the energy balance; powers are doubled
+BLOCK_SUMS = (
+    "twice_kinetic",
+    "gravity_work",
+    "load_work",
+    "absolute_work",
+    "dashpot_power",
+    "drive_power",
+)
+POINT_SUMS = ("elastic_energy", "friction_work")
 
 
 class Constant(NamedTuple):
@@ -40,6 +54,8 @@ CONSTANTS = {
     "CROSSING_SINE": Constant(1e-3, "sine between two edges that cross"),
     "CROSSING_ERROR": Constant(1e-9, "of the length of an edge: rounding of a distance of blocks"),
     "RANGE_TOLERANCE": Constant(1e-10, "m by which a corner may leave its range: no chatter"),
+    "BLOCKS_PER_PART": Constant(BLOCKS_PER_PART, "of a phase of a step"),
+    "POINTS_PER_PART": Constant(POINTS_PER_PART, "of a phase of a step"),
 }
 
 
@@ -100,6 +116,7 @@ STEP = {
         "dem_update_geometry *", "fills the rows; returns contacts that went on"
     ),
     "geometry": Field("void *", "its argument"),
+    "has_parts": Field("long long", "1 if threads may update parts of the geometry"),
     "block_a": Field("const long long *", "(k,): the block with the lower number"),
     "block_b": Field("const long long *", "(k,): the other block"),
     "closure": Field("const double *", "(k,): m, depth of the overlap"),
@@ -124,6 +141,13 @@ STEP = {
     "driven_block": Field("const long long *", "(n_driven,)"),
     "driven_axis": Field("const long long *", "(n_driven,): number of the motion"),
     "driven_velocity": Field("const double *", "(n_driven,): to be reached in this step"),
+    # ------------------------------------------------------------------ threads
+    "n_ranges": Field("long long", "ranges of blocks, each for one thread"),
+    "first_block": Field("const long long *", "(n_ranges + 1,): multiples of the blocks of a part"),
+    "next_part": Field("long long", "of the present phase, which the next thread takes"),
+    "point_forces": Field("double *", "(k, 2, dim): of joint, dashpots along closure, shears; N"),
+    "block_sums": Field("double *", "(parts of the blocks, DEM_BLOCK_SUMS): energies"),
+    "point_sums": Field("double *", "(parts of the points, DEM_POINT_SUMS): energies"),
     # ------------------------------------------------------------------ what a step reports
     "energy": Field("double *", "(DEM_ENERGIES,): J"),
     "too_fast": Field("long long", "a block that moves too far in a step; -1 for none"),
@@ -308,9 +332,12 @@ def layout_h() -> str:
         ),
         _enumeration(MEASURES, "MEASURES"),
         _enumeration(ENERGIES, "ENERGIES"),
+        _enumeration(PHASES, "PHASES"),
+        _enumeration(BLOCK_SUMS, "BLOCK_SUMS"),
+        _enumeration(POINT_SUMS, "POINT_SUMS"),
         "typedef struct { double x, y; } dem_vector;",
         "typedef int dem_advance(void *batch, int operation);",
-        "typedef long long dem_update_geometry(void *geometry);",
+        "typedef long long dem_update_geometry(void *geometry, long long begin, long long end);",
     ]
     for name, fields in STRUCTURES.items():
         lines += [

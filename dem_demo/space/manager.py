@@ -177,7 +177,7 @@ class FacePoints(ContactRows):
 
     def update(self) -> None:
         """Compute closures and kinematics at the present places of the blocks."""
-        self.arrays.call("update_face_points")
+        self.arrays.call("update_face_points", 0, self.arrays.n_points)
 
 
 class FaceContactManager:

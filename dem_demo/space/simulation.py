@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from jointlaw.kernels.threads import thread_count
+
 from ..compiled import StepArrays, function_address
 from ..contact import Joints
 from ..dynamics.energy_balance import DISCARDED, EnergyBalance
@@ -31,6 +33,7 @@ from .manager import POINT_ARRAYS, FaceContactManager, FacePoints
 from .read import parse
 from .scene import SpaceScene
 
+MIN_POINTS_FOR_THREADS = 2000  # with fewer a second thread costs more than it saves
 OF_BOLTS = "blocks.bolts."  # paths of the state that only the plane has
 
 
@@ -110,6 +113,10 @@ class SpaceSimulation(Simulation):
         arrays.bind(self.blocks, "axes")
         arrays.bind(geometry=self.contacts.arrays)
         arrays.update_geometry = function_address("update_face_points")
+        arrays.has_parts = 1
+
+    def _count_threads(self) -> int:
+        return thread_count() if self.joints.n > MIN_POINTS_FOR_THREADS else 1
 
     # ------------------------------------------------------------------ contacts that change
 

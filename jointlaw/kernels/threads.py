@@ -21,13 +21,18 @@ def thread_count() -> int:
 
 
 def run_on_threads(work: Callable[[], object], threads: int) -> None:
-    """Call `work()` once on each of `threads` threads, this one included, and wait for all."""
+    """Call `work()` on up to `threads` threads, this one included, and wait for all.
+
+    One call of `work` must be able to do everything alone, as when it fetches parts until none is
+    left: a thread that has not started when this one is done, on a busy machine, does not start.
+    """
     futures = [_executor(os.getpid()).submit(work) for _ in range(1, threads)]
     try:
         work()
     finally:
-        wait(futures)
-    for future in futures:
+        started = [future for future in futures if not future.cancel()]
+        wait(started)
+    for future in started:
         future.result()
 
 

@@ -2,6 +2,7 @@
 made, found and refused."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import kinds
@@ -178,16 +179,41 @@ def test_threads_change_no_bit(monkeypatch):
 
 def test_what_fails_on_another_thread_is_raised_after_all_have_ended():
     ended = []
+    has_started = threading.Event()
 
     def work() -> None:
         if threading.current_thread() is not threading.main_thread():
+            has_started.set()
             raise MemoryError("no memory")
+        assert has_started.wait(60)
         ended.append(True)
 
     for _ in range(2):  # the thread that failed works on
+        has_started.clear()
         with pytest.raises(MemoryError, match="no memory"):
             run_on_threads(work, 2)
     assert ended == [True, True]
+
+
+def test_a_thread_that_comes_too_late_is_not_waited_for(monkeypatch):
+    """The other thread is busy: this one does the whole work."""
+    pool = ThreadPoolExecutor(1)
+    monkeypatch.setattr("jointlaw.kernels.threads._executor", lambda _: pool)
+    release = threading.Event()
+    running = threading.Event()
+    calls = []
+
+    def occupy() -> None:
+        if threading.current_thread() is not threading.main_thread():
+            running.set()
+            assert release.wait(60)
+        else:
+            assert running.wait(60)
+            run_on_threads(lambda: calls.append(threading.current_thread()), 2)
+            release.set()
+
+    run_on_threads(occupy, 2)
+    assert calls == [threading.main_thread()]
 
 
 @pytest.mark.parametrize(

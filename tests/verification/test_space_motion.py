@@ -499,14 +499,23 @@ def test_extruded_scene_moves_as_in_the_plane(degrees, slides):
 
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
-    """A wall of rough joints that falls on the ground, on one thread and on two: the same bits."""
+    """A wall of rough joints that falls on the ground, on one thread, two and three: the same bits.
+
+    Blocks, points and joints are divided among the threads, and contacts are searched again."""
+    monkeypatch.setattr("dem_demo.space.simulation.MIN_POINTS_FOR_THREADS", 0)
+    monkeypatch.setattr("jointlaw.kernels.engine.MIN_SLIDERS_FOR_THREADS", 0)
     states = []
-    for threads in ("1", "2"):
-        monkeypatch.setenv("JOINTLAW_THREADS", threads)
-        sim = wall(6, 6, ROCK, "end = 0.3\nsettle = false\n", gap=2e-4)
+    for threads in (1, 2, 3):
+        monkeypatch.setenv("JOINTLAW_THREADS", str(threads))
+        sim = wall(8, 6, ROCK, "end = 0.3\nsettle = false\n", gap=2e-4)
+        contacts = sim.contacts
+        assert sim.arrays.threads == threads
+        assert len(np.unique(sim.arrays.bound_arrays["first_block"])) == threads + 1
         for _ in range(100):
             sim.step()
+        assert sim.contacts is not contacts
         states.append(sim.state())
-    one, two = states
-    for name, value in one.items():
-        assert np.array_equal(value, two[name]), name
+    one, *others = states
+    for other in others:
+        for name, value in one.items():
+            assert np.array_equal(value, other[name]), name

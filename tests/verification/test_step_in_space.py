@@ -13,7 +13,9 @@ from dem_demo.contact import ContactRows, Joints
 from dem_demo.dynamics.energy_balance import EnergyBalance
 from dem_demo.dynamics.timestep import bound_of_blocks, closure_and_shear_rates, largest_step
 
-UPDATE_GEOMETRY = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_void_p)  # as in layout.h
+UPDATE_GEOMETRY = ctypes.CFUNCTYPE(
+    ctypes.c_longlong, ctypes.c_void_p, ctypes.c_longlong, ctypes.c_longlong
+)
 FRICTION = 0.6
 SIZE = np.array([1.0, 0.8, 0.2])  # m, of the block
 DENSITY = 2600.0
@@ -85,7 +87,7 @@ class BlockOnPlane:
         self.arrays.bind(
             driven_block=np.ones(len(axes), np.int64), driven_axis=axes, driven_velocity=speeds
         )
-        self.callback = UPDATE_GEOMETRY(lambda _: self.fill_rows() or 0)
+        self.callback = UPDATE_GEOMETRY(lambda *_: self.fill_rows() or 0)
         self.arrays.update_geometry = ctypes.cast(self.callback, ctypes.c_void_p).value
         self.arrays.bind(
             self, "motion", "velocity", "axes", "inertia", "gravity", "inverse_mass", "is_mobile"
@@ -104,6 +106,7 @@ class BlockOnPlane:
             checked_stiffness=np.full(joints.n, np.inf),
         )  # fmt: skip
         joints.bind(self.arrays)
+        self.arrays.divide(self.rows.block_a, self.rows.block_b)
         self.motion[6:] = self.velocity
         self.arrays.call("compute_rates")
         self.arrays.call("compute_forces", 0.5 * self.dt)

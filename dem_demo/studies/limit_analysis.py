@@ -18,10 +18,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_array, diags, eye, hstack, vstack
 
 import jointlaw as jl
+from jointlaw.joints.normal_control import NormalCondition, closing_increments
 
 from ..contact import ContactManager, Contacts
 from ..dynamics.blocks import Blocks, apply_loads
@@ -34,6 +36,7 @@ LARGEST_FACTOR = 64.0
 TOLERANCE = 1e-3  # of the factor
 STRESSES = 7  # at which the strength of a rough law gets a tangent
 CHECKED_STRESSES = 61  # at which lines of a strength that is not concave must lie above it
+SHEAR_STEPS = 120  # of a test up to the peak of a bond, and to the end of the test
 STRESS_RANGE = 1e-3, 3.0  # of the largest overburden stress: where they lie
 SLOPE_STEP = 1.05  # ratio of the two stresses that give a tangent
 BALANCED = 1e-6  # unbalanced forces over the largest load that are rounding of the solver
@@ -133,27 +136,44 @@ def strength_of(law: jl.Law, stress: float) -> Strength:
         return Strength(np.array([law.cohesion]), np.array([law.friction]), law.tension)
     low, high = (fraction * stress for fraction in STRESS_RANGE)
     stresses = np.geomspace(low, high, STRESSES)
-    peaks = np.array([peak_strength(law, s) for s in stresses])
-    strength_nearby = np.array([peak_strength(law, SLOPE_STEP * s) for s in stresses])
+    peaks, strength_nearby = peak_strength(law, [stresses, SLOPE_STEP * stresses])
     friction = (strength_nearby - peaks) / ((SLOPE_STEP - 1.0) * stresses)
     cohesion = peaks - friction * stresses
     if (np.diff(friction) > 0.0).any():  # not concave
         stresses = np.geomspace(low, high, CHECKED_STRESSES)
-        peaks = np.array([peak_strength(law, s) for s in stresses])
+        peaks = peak_strength(law, stresses)
         excess = peaks - (cohesion[:, None] + friction[:, None] * stresses)  # (lines, stresses)
         cohesion += np.maximum(excess.max(axis=1), 0.0)
     return Strength(cohesion, friction, law.tensile_strength)
 
 
-def peak_strength(law: jl.Law, stress: float) -> float:
-    """Largest shear stress (Pa) of direct shear at a normal stress (Pa)."""
+def peak_strength(law: jl.Law, stress: ArrayLike) -> np.ndarray:
+    """Largest shear stress (Pa) of direct shear at each normal stress (Pa), in its shape.
+
+    The joints of all tests are one batch. Raises ArithmeticError where the law cannot bear a stress.
+    """
+    stresses = np.atleast_1d(np.asarray(stress, dtype=float))
+    condition = NormalCondition(stresses.ravel(), stresses.ravel())
+    joints = law.joints(stresses.size, track_dissipation=False)
+    step = np.zeros((stresses.size, law.dim))
+    peak = np.zeros(stresses.size)
+    for slip in np.concatenate([[0.0], _slip_increments(law)]):
+        step[:, 0] = 0.0
+        step[:, 1] = slip
+        step[:, 0] = closing_increments(joints, step, condition)
+        F, _ = joints.update(step, tangent=False)
+        peak = np.maximum(peak, np.abs(F[:, 1]))
+    return peak.reshape(np.shape(stress))
+
+
+def _slip_increments(law: jl.Law) -> np.ndarray:
+    """Slip increments (m) of a shear test past the peak of a law."""
     slip = slip_distance(law)
     to = [1.2 * slip]
     bond = getattr(law, "bond", None)
     if bond is not None:  # a brittle bond peaks early
         to = sorted([min(1.01 / bond.limits[1][1], slip), 1.2 * slip])
-    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
-    return float(np.abs(record.shear_stress).max())
+    return np.repeat(np.diff(to, prepend=0.0) / SHEAR_STEPS, SHEAR_STEPS)
 
 
 class Imbalance(NamedTuple):

@@ -150,7 +150,7 @@ def strength_of(law: jl.Law, stress: float) -> Strength:
 def peak_strength(law: jl.Law, stress: ArrayLike) -> np.ndarray:
     """Largest shear stress (Pa) of direct shear at each normal stress (Pa), in its shape.
 
-    The joints of all tests are one batch. Raises ArithmeticError where the law cannot bear a stress.
+    The joints of all tests are one batch. Raises ArithmeticError where the law cannot bear one.
     """
     stresses = np.atleast_1d(np.asarray(stress, dtype=float))
     condition = NormalCondition(stresses.ravel(), stresses.ravel())

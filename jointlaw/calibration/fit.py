@@ -342,7 +342,7 @@ def fit_curves(
         a and mating_length, with three normal stresses or more degradation_stress too.
     fixed: known values of other parameters, such as alpha from a scan, in SI units.
     law: values of all fixed parameters, `mating_length` among them; None takes rock
-        asperities, `forward.DEFAULT`, of "individual" formation, and without a closure curve
+        asperities, `forward.default_law`, of "individual" formation, and without a closure curve
         heights of `forward.DEFAULT_BETA` and the density with `forward.DEFAULT_STIFFNESS`.
         Without degradation in the law, a free degradation_stress leaves the share
         `forward.DEFAULT_SLOPE_RESIDUAL` of the slopes. A law with a plane keeps it.

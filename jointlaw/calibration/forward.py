@@ -1,7 +1,8 @@
 """The forward model: from parameter values to a law and its closure curve, and from a law back."""
 
 import math
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, field, is_dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,14 +25,6 @@ from ..parameters.rock import ROCK
 from ..support.checks import Array
 from .priors import PARTS, Values
 
-# Used without an initial law. The mean inclination is 19 degrees, as of the rough granite of the
-# paper
-DEFAULT = JointLaw(
-    orientation=Orientation(a=3.0),
-    asperity=ROCK,
-    heights=GammaHeights(alpha=3.7, beta=1e-5, formation="individual"),
-    asperity_density=1e6,
-)
 # Of shear tests without a closure test: heights of 0.2 mm (standard deviation), and the normal
 # stiffness in first loading of joints in laboratories, 15 to 200 GPa/m (Bandis, Lumsden & Barton
 # 1983), from which the density of the asperities follows: one per 1.1 mm x 1.1 mm
@@ -45,6 +38,20 @@ DEFAULT_SLOPE_RESIDUAL = 0.3
 INITIAL_STEPS = 30  # of a shear test; a fit doubles them while the results depend on them
 
 
+@cache
+def default_law() -> JointLaw:
+    """The law of a fit without an initial law.
+
+    Its mean inclination is 19 degrees, as of the rough granite of the paper.
+    """
+    return JointLaw(
+        orientation=Orientation(a=3.0),
+        asperity=ROCK,
+        heights=GammaHeights(alpha=3.7, beta=1e-5, formation="individual"),
+        asperity_density=1e6,
+    )
+
+
 @dataclass(frozen=True)
 class Settings:
     """The fixed properties of a law.
@@ -55,7 +62,7 @@ class Settings:
     steps: steps of a whole shear test, see `ShearCurve.path`.
     """
 
-    law: JointLaw = DEFAULT
+    law: JointLaw = field(default_factory=default_law)
     resolution: Any = "balanced"
     closure_range: Any = None
     steps: int = INITIAL_STEPS

@@ -16,7 +16,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage, optimize, signal
+from scipy import fft, ndimage, optimize
 
 from ..support.checks import Array, finite, more_than, one_of
 from .asperities import remove_mean_plane
@@ -98,14 +98,26 @@ def _best_shift(a: Array, b: Array) -> tuple[float, tuple[int, int]]:
     Shifts with an overlap of less than half the smaller face are not tried.
     """
     b = b[::-1, ::-1]
-    ones_a = np.ones(a.shape)
-    ones_b = np.ones(b.shape)
-    count = np.maximum(np.rint(signal.fftconvolve(ones_a, ones_b)), 1.0)
-    sum_a = signal.fftconvolve(a, ones_b)
-    sum_b = signal.fftconvolve(ones_a, b)
-    variance_a = signal.fftconvolve(a**2, ones_b) - sum_a**2 / count
-    variance_b = signal.fftconvolve(ones_a, b**2) - sum_b**2 / count
-    covariance = signal.fftconvolve(a, b) - sum_a * sum_b / count
+    rows, columns = np.add(a.shape, b.shape) - 1
+    padded = [fft.next_fast_len(int(n), real=True) for n in (rows, columns)]
+
+    def transform(values: Array) -> Array:
+        return fft.rfft2(values, padded)
+
+    def convolve(first: Array, second: Array) -> Array:
+        """The sum of products over the overlap, for every shift, from two transforms."""
+        return fft.irfft2(first * second, padded)[:rows, :columns]
+
+    transform_a = transform(a)
+    transform_b = transform(b)
+    ones_a = transform(np.ones(a.shape))
+    ones_b = transform(np.ones(b.shape))
+    count = np.maximum(np.rint(convolve(ones_a, ones_b)), 1.0)
+    sum_a = convolve(transform_a, ones_b)
+    sum_b = convolve(ones_a, transform_b)
+    variance_a = convolve(transform(a**2), ones_b) - sum_a**2 / count
+    variance_b = convolve(ones_a, transform(b**2)) - sum_b**2 / count
+    covariance = convolve(transform_a, transform_b) - sum_a * sum_b / count
     floor = 1e-9 * (float(np.sum(a**2)) * float(np.sum(b**2)) + 1e-300)
     correlation = covariance / np.sqrt(np.maximum(variance_a * variance_b, floor))
     correlation[count < MIN_OVERLAP * min(a.size, b.size)] = -np.inf

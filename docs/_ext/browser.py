@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from jointlaw.calibration.forward import (
-    DEFAULT,
     DEFAULT_BETA,
     DEFAULT_STIFFNESS,
     DEFAULT_STIFFNESS_STRESS,
+    default_law,
     density_for_stiffness,
 )
 from jointlaw.hosts.browser import export
@@ -45,8 +45,8 @@ def match_script():
 
 def match_law():
     """The law of the fits without a closure test: their default contacts, heights and stiffness."""
-    heights = replace(DEFAULT.heights, beta=DEFAULT_BETA)
-    law = replace(DEFAULT, heights=heights, closure_range=None)
+    heights = replace(default_law().heights, beta=DEFAULT_BETA)
+    law = replace(default_law(), heights=heights, closure_range=None)
     density = density_for_stiffness(law, DEFAULT_STIFFNESS, DEFAULT_STIFFNESS_STRESS)
     law = replace(law, asperity_density=density)
     return replace(law, closure_range=law.closure(LARGEST_STRESS))

@@ -22,8 +22,10 @@ import jointlaw as jl
 import jointlaw.cli.field
 import jointlaw.cli.fit
 import jointlaw.cli.main
+from dem_demo.output.pictures import Pictures
 from jointlaw.cli.command import Group
 from jointlaw.hosts import HOSTS
+from jointlaw.surface.fit import SurfaceFit
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SHEAR = "--to 1um --steps 3"
@@ -383,8 +385,13 @@ def real_fit():
 def outcome(tmp_path, monkeypatch, capsys, states, real_fit):
     """outcome(main, line): exit status, what is printed, and what is written, in a new folder."""
     monkeypatch.setattr("webbrowser.open", lambda address: None)
-    for kind in (jl.TestRecord, type(real_fit)):  # only the names of pictures are compared
-        monkeypatch.setattr(kind, "plot", lambda self, path, **options: path.write_bytes(b""))
+    empty = lambda self, path, **options: path.write_bytes(b"")  # noqa: E731
+    # only the names of pictures are compared
+    for kind in (jl.TestRecord, SurfaceFit, type(real_fit)):
+        monkeypatch.setattr(kind, "plot", empty)
+    for picture in ("final", "animation"):
+        monkeypatch.setattr(Pictures, picture, empty)
+    monkeypatch.setattr(Pictures, "estimate_time", lambda self, frames: 60.0)
     monkeypatch.setattr(jointlaw.cli.fit, "fit_flow", report)
     monkeypatch.setattr(jointlaw.cli.field, "from_field", FROM_FIELD)
     monkeypatch.setattr(dem_demo.cli.ablate, "ablate", report_scene)

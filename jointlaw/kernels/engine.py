@@ -38,6 +38,7 @@ from .threads import run_on_threads, thread_count
 Index = NDArray[np.intp]
 JOINTS_PER_BLOCK = 8  # JLAW_JOINTS_PER_BLOCK in native/batch.h
 CACHE_LINE_BYTES = 64
+MAX_JOINTS_OF_ENTRIES = 2**32  # whose numbers the entries of a list hold (native/batch.h)
 JOINTS_PER_NUMPY_CALL = 4096  # keeps the temporaries of the numpy kernel in cache
 CHUNKS_PER_THREAD = 16  # a thread fetches as many chunks of joints if all threads are equally fast
 MIN_SLIDERS_FOR_THREADS = 20_000  # with fewer a second thread costs more than it saves
@@ -316,9 +317,10 @@ class NativeEngine(StateRows):
         self._run(operation, self._prepare_call(state, n, None, address(out)))
         return out
 
-    def _sort_by_block(self, state: Array, step: Step) -> tuple[Index | None, Index | None]:
-        """The joints of a step sorted by block, and their places in its list, None if sorted.
+    def _sort_by_block(self, state: Array, step: Step) -> tuple[Index | None, Any]:
+        """The list of joints of a step as the library reads it: an index or entries, or neither.
 
+        Entries (m, 2) are pairs of a joint and its row in the arrays of the step, sorted by block.
         Raises ValueError for a list that names a joint twice or a joint outside the batch.
         """
         where = step.where
@@ -330,17 +332,21 @@ class NativeEngine(StateRows):
             verdict = require_valid_list(self, where, blocks * lanes)
         if lanes == 1 or verdict == ListVerdict.INCREASING:
             return where, None
+        if blocks * lanes > MAX_JOINTS_OF_ENTRIES:
+            raise ValueError(
+                f"where is a list in any order of a batch of more than {MAX_JOINTS_OF_ENTRIES} "
+                "joints: sort it, or make several batches"
+            )
         if len(where) < blocks // JOINTS_PER_BLOCK:  # the library counts the joints of every block
             order = np.argsort(where)
-            return where[order], order
-        joints_and_places = np.empty((2, len(where)), np.intp)
-        if self._library_sort(address(where), len(where), blocks, address(joints_and_places)):
+            return None, np.stack([where[order], order], axis=1).astype(np.uint32)
+        entries = np.empty((len(where), 2), np.uint32)
+        if self._library_sort(address(where), len(where), blocks, address(entries)):
             raise MemoryError("no memory to sort a list of joints")
-        joints, places = joints_and_places
-        return joints, places
+        return None, entries
 
     def _prepare_call(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
-        """A call for n joints; arrays: addresses of d, F, C, measures, the joints, their order."""
+        """A call for n joints; arrays: addresses of d, F, C, measures, index, entries."""
         _, rows, lanes = state.shape
         addresses = address(state), *arrays, *[None] * (6 - len(arrays))
         return library.BatchCall(

@@ -7,7 +7,7 @@
  * gather instructions except for the look-up in the first-loading curve. Branches that some lanes
  * need are taken by all lanes and masked.
  *
- * Three things follow from this layout. A list of joints (b->index) is sorted by block. A block with
+ * Three things follow from this layout. A list of joints is sorted by block. A block with
  * many listed joints is advanced as a whole, and the states of its other joints are restored.
  * Where few joints of a block are listed, joints of several blocks are gathered into a copy,
  * advanced, and copied back (copy_lanes: one shuffle per row). A trial step (b->commit = 0) advances
@@ -183,11 +183,27 @@ static joint_group empty_group(void)
   return g;
 }
 
+/* Entry k of a list: its joint, and the row of the joint in d, F, C and measures */
+static long long joint_of_entry(const jlaw_batch *b, long k)
+{
+  return b->entries ? (long long) b->entries[k].joint : b->index[k];
+}
+
+static long long block_of_entry(const jlaw_batch *b, long k)
+{
+  return joint_of_entry(b, k) / BLOCK;
+}
+
+static long row_of_entry(const jlaw_batch *b, long k)
+{
+  return b->entries ? (long) b->entries[k].row : k;
+}
+
 /* Add entry k of the list to a group, in the lane of its joint */
 static void add_entry(const jlaw_batch *b, joint_group *g, long k)
 {
-  const int l = (int) (b->index[k] % BLOCK);
-  g->row[l] = b->order ? (long) b->order[k] : k;
+  const int l = (int) (joint_of_entry(b, k) % BLOCK);
+  g->row[l] = row_of_entry(b, k);
   g->lanes |= 1 << l;
 }
 
@@ -239,16 +255,21 @@ static void gather(const jlaw_batch *b, const joint_group *group, double *block,
   }
 }
 
-/* Prefetch the rows of the entries from `start` on, which a list in any order scatters */
-static void prefetch_rows(const jlaw_batch *b, long start)
+/* Prefetch `count` numbers, which may begin anywhere in a cache line */
+static void prefetch_numbers(const double *at, int count)
 {
-  const int dim = b->law->dim;
-  for (long k = start; b->order && k < b->n && k < start + BLOCK; k++) {
-    const long row = (long) b->order[k];
-    __builtin_prefetch(b->d + row * dim);
-    __builtin_prefetch(b->F + row * dim, 1);
-    if (b->C) __builtin_prefetch(b->C + row * dim * dim, 1);
-  }
+  for (int i = 0; i < count; i += JLAW_CACHE_LINE / (int) sizeof *at)
+    __builtin_prefetch(at + i, 1);
+  __builtin_prefetch(at + count - 1, 1);
+}
+
+/* Prefetch the rows of the entries first to last - 1 in an array with `size` numbers a row: a list in
+ * any order scatters them */
+static void prefetch_rows(const jlaw_batch *b, const double *array, int size, long first, long last)
+{
+  if (!array || !b->entries) return;
+  for (long k = first; k < last && k < b->n; k++)
+    prefetch_numbers(array + (size_t) b->entries[k].row * size, size);
 }
 
 static void prefetch_block(const jlaw_batch *b, const double *block)
@@ -256,39 +277,43 @@ static void prefetch_block(const jlaw_batch *b, const double *block)
   for (int r = 0; r < b->rows; r++) __builtin_prefetch(block + (size_t) r * BLOCK, 1);
 }
 
-/* Advance entries first to last - 1 of b->index. A block of joints belongs to the thread that takes
+/* Advance entries first to last - 1 of a list. A block of joints belongs to the thread that takes
  * its first entry. Returns 0, or -1 if no memory is left. */
 static int advance_listed(const jlaw_batch *b, long first, long last)
 {
   const size_t rows = (size_t) b->rows, size = rows * BLOCK;
-  const long long *index = b->index;
+  const int dim = b->law->dim;
   double *copy = (double *) calloc(2 * size, sizeof *copy);
   if (!copy) return -1;
   gathered_group gathered = {empty_group(), 0, 0, {{NULL, 0, 0}}};
-  while (first > 0 && first < last && index[first] / BLOCK == index[first - 1] / BLOCK) first++;
+  while (first > 0 && first < last && block_of_entry(b, first) == block_of_entry(b, first - 1)) first++;
   for (long start = first; start < last;) {
-    const long long block = index[start] / BLOCK;
+    const long long block = block_of_entry(b, start);
+    const long begin = start;
     joint_group group = empty_group();
-    for (; start < b->n && index[start] / BLOCK == block; start++) add_entry(b, &group, start);
-    prefetch_rows(b, start);
+    for (; start < b->n && block_of_entry(b, start) == block; start++) add_entry(b, &group, start);
+    /* the fill buffers of a processor hold about 16 cache lines: F and C now, d after the step */
+    prefetch_rows(b, b->F, dim, begin, start);
+    prefetch_rows(b, b->C, dim * dim, begin, start);
     double *state = state_of(b, block * BLOCK);
     if (group.lanes == ALL_LANES || count_lanes(group.lanes) > MAX_GATHERED_OF_BLOCK) {
-      const long long next = start < last ? index[start] / BLOCK - block : 0;
+      const long long next = start < last ? block_of_entry(b, start) - block : 0;
       advance_in_place(b, &group, state, (size_t) next * size, copy);
     } else {
-      if (start < last) prefetch_block(b, state_of(b, index[start] / BLOCK * BLOCK));
+      if (start < last) prefetch_block(b, state_of(b, block_of_entry(b, start) * BLOCK));
       gather(b, &group, state, &gathered, copy + size);
     }
+    prefetch_rows(b, b->d, dim, start + BLOCK, start + 2 * BLOCK);
   }
   advance_gathered(b, &gathered, copy + size);
   free(copy);
   return 0;
 }
 
-/* Advance joints, or entries of b->index, first to last - 1 */
+/* Advance joints, or entries of a list, first to last - 1 */
 static int advance(const jlaw_batch *b, long first, long last)
 {
-  return b->index ? advance_listed(b, first, last) : advance_all(b, first, last);
+  return b->index || b->entries ? advance_listed(b, first, last) : advance_all(b, first, last);
 }
 
 /* Measures (n, 5) of joints first to last - 1, in the order of kernels/element.py, into b->F */

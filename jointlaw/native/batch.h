@@ -30,14 +30,21 @@ enum { /* verdicts of jlaw_check_list; library.py has the same numbers */
        JLAW_NO_MEMORY = -3
 };
 
+enum { JLAW_CACHE_LINE = 64 /* bytes */ };
+
+typedef struct { /* a listed joint */
+  unsigned joint, row; /* row in d, F, C and measures */
+} jlaw_entry;
+
 typedef struct {
   const jlaw_law *law;
   double *state;          /* (blocks, rows, JLAW_JOINTS_PER_BLOCK), or (n, rows) if contiguous */
   const double *d;        /* (n, dim) */
   double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
   double *measures;       /* (n, JLAW_MEASURES + dim) after the step, or NULL */
-  const long long *index; /* (n,): the joints to advance, sorted by block, with d; NULL: all */
-  const long long *order; /* (n,): their rows in d, F, C and measures; NULL: 0, 1, 2 ... */
+  const long long *index;    /* (n,): the joints to advance, of which joint k has row k in d, F, C
+                              * and measures; sorted by block, or in any order if contiguous */
+  const jlaw_entry *entries; /* (n,): as index, in any order of rows, sorted by block. Both NULL: all */
   long long n;
   long long next,
       chunk; /* first joint that no thread has taken, 0 before a call; joints per grab */

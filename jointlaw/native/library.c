@@ -72,18 +72,22 @@ OUT int jlaw_check_list(const long long *joints, long long n, long long count)
   return verdict;
 }
 
-/* Sort joints (n,) by their blocks: writes the sorted joints and their places in the list into
- * sorted (2, n). blocks: number of blocks of the batch. Returns 0, or JLAW_NO_MEMORY. */
-OUT int jlaw_sort_by_block(const long long *joints, long long n, long long blocks, long long *sorted)
+/* Sort joints (n,) of a list by their blocks into entries (n,). blocks: number of blocks of the batch,
+ * whose joints an unsigned numbers. Returns 0, or JLAW_NO_MEMORY. */
+OUT int jlaw_sort_by_block(const long long *joints, long long n, long long blocks,
+                           jlaw_entry *entries)
 {
-  long long *place = (long long *) calloc((size_t) blocks + 1, sizeof *place); /* of each block */
+  enum { ENTRIES_AHEAD = 16 };
+  unsigned *place = (unsigned *) calloc((size_t) blocks + 1, sizeof *place); /* of each block */
   if (!place) return JLAW_NO_MEMORY;
   for (long long k = 0; k < n; k++) place[joints[k] / JLAW_JOINTS_PER_BLOCK + 1]++;
   for (long long i = 0; i < blocks; i++) place[i + 1] += place[i];
   for (long long k = 0; k < n; k++) {
-    const long long at = place[joints[k] / JLAW_JOINTS_PER_BLOCK]++;
-    sorted[at] = joints[k];
-    sorted[n + at] = k;
+    if (k + ENTRIES_AHEAD < n)
+      __builtin_prefetch(entries + place[joints[k + ENTRIES_AHEAD] / JLAW_JOINTS_PER_BLOCK], 1);
+    jlaw_entry *entry = entries + place[joints[k] / JLAW_JOINTS_PER_BLOCK]++;
+    entry->joint = (unsigned) joints[k];
+    entry->row = (unsigned) k;
   }
   free(place);
   return 0;

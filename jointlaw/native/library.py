@@ -24,7 +24,7 @@ class BatchCall(ctypes.Structure):
     _fields_ = [
         *(
             (name, ctypes.c_void_p)
-            for name in ("law", "state", "d", "F", "C", "measures", "index", "order")
+            for name in ("law", "state", "d", "F", "C", "measures", "index", "entries")
         ),
         *((name, ctypes.c_longlong) for name in ("n", "next", "chunk")),
         *(

@@ -458,6 +458,30 @@ def test_listed_joints_get_the_bits_of_a_whole_step_and_others_keep_theirs(
     assert by_list.update(d_next)[0].tobytes() == expected.tobytes()
 
 
+def test_few_joints_of_a_large_batch_in_any_order_get_the_bits_of_a_whole_step(make_law):
+    """Numpy sorts lists of fewer joints than an eighth of the blocks."""
+    law = make_law()
+    joints = [900, 3, 901, 500]
+    whole = law.joints(1000)
+    by_list = law.joints(1000)
+    d = np.random.default_rng(5).normal(0.0, 1e-7, (1000, law.dim))
+    F, C = whole.update(d)
+    F_listed, C_listed = by_list.update(d[joints], where=joints)
+    assert F_listed.tobytes() == F[joints].tobytes()
+    assert C_listed.tobytes() == C[joints].tobytes()
+
+
+def test_a_list_in_any_order_of_a_batch_with_too_many_joints_is_refused(monkeypatch, law):
+    monkeypatch.setenv("JOINTLAW_KERNEL", "native")
+    monkeypatch.setattr(engine, "MAX_JOINTS_OF_ENTRIES", N - 1)
+    batch = law.joints(N)
+    d = np.full((2, law.dim), 1e-8)
+    with pytest.raises(ValueError, match=f"more than {N - 1} joints: sort it"):
+        batch.update(d, where=[1, 0])
+    assert not batch.snapshot().values.any()
+    batch.update(d, where=[0, 1])
+
+
 def test_measures_of_a_list_are_in_its_order(make_law):
     law = make_law()
     whole = law.joints(N, track_dissipation=False)

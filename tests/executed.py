@@ -14,6 +14,7 @@ file by those that read the file.
 import ast
 import hashlib
 import json
+import math
 import shutil
 from functools import cache
 from pathlib import Path
@@ -202,7 +203,8 @@ class ExecutedMap:
         """Test files that can detect a fault in a line of a file: tests that execute it, by time.
 
         A list of pairs of name and processor time (s) for each test file; all its tests if the
-        file only reads the text, or if the fault acts when the module is imported.
+        file only reads the text, or if the fault acts when the module is imported; the file itself
+        if it is not recorded.
         """
         block = self.sources.block_at(file, line) if file in self.sources.trees else None
         names = None
@@ -229,6 +231,9 @@ class ExecutedMap:
                     for name, (blocks, seconds) in tests
                     if not acting.isdisjoint(blocks)
                 ]
+        found |= {
+            file: [(file, math.inf)] for file in self.test_files() if file not in self.records
+        }
         return {file: sorted(tests, key=lambda one: one[1]) for file, tests in found.items()}
 
     def reads_names(self, record, names):

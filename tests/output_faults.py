@@ -26,7 +26,7 @@ UNIT_AT_END = re.compile(
 )
 TABLE_NAME = re.compile(r"_?[A-Z_]*(COLUMNS|ENERGIES|TITLES|UNITS)$")
 UNIT_TABLE_NAME = re.compile(r"_?[A-Z_]*(UNITS|PREFIX|PREFIXES|FACTORS|STRESS|COMMON)$")
-POWERS_OF_TEN = {1e3, 1e6, 1e9, 1e-3, 1e-6, 1e-9}
+POWERS_OF_TEN = {1e3, 1e6, 1e9, 1e-3, 1e-6}  # 1e-9 is a tolerance wherever it stands
 ARTISTS = {
     "plot", "quiver", "scatter", "errorbar", "fill_between", "axhline", "axvline", "annotate",
     "text", "bar", "add_mesh", "add_arrows", "add_lines", "add_points", "LineCollection",
@@ -139,6 +139,12 @@ def column_faults(source):
     """Exchanges of neighbours in tables of columns: values in dicts, titles in lists."""
     if "support" in source.file:
         return
+    synonyms = {  # other names of one column, in any order
+        one
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Quantity"
+        for one in node.args
+    }
     tables = {value for name, value in constants_of_module(source) if TABLE_NAME.match(name)}
     for node in ast.walk(source.tree):
         if isinstance(node, ast.Dict):
@@ -148,7 +154,7 @@ def column_faults(source):
                     one, other = node.values[i : i + 2]
                     if None not in names[i : i + 2] and ast.dump(one) != ast.dump(other):
                         yield source.exchange("columns", one, other)
-        elif isinstance(node, ast.Tuple | ast.List):
+        elif isinstance(node, ast.Tuple | ast.List) and node not in synonyms:
             names = texts(node.elts)
             if has_unit(names) or node in tables:
                 for i in range(len(names) - 1):

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import same_color, to_rgba
+from matplotlib.colors import rgb_to_hsv, same_color, to_rgba
 from matplotlib.quiver import Quiver
 from PIL import Image
 from scene_text import block, coulomb, lines
@@ -18,11 +18,11 @@ from scipy.ndimage import gaussian_filter
 import dem_demo.output.pictures as block_pictures
 import jointlaw as jl
 from dem_demo.dynamics.simulation import Simulation
-from dem_demo.output.pictures import Pictures, curves
+from dem_demo.output.pictures import BOLT_COLOURS, JOINT_STATES, Pictures, curves
 from dem_demo.output.record import RunRecord
 from dem_demo.output.run import advance
 from dem_demo.scene.read import parse
-from jointlaw.calibration.aperture import FORMS, FlowTest, fit_flow
+from jointlaw.calibration.aperture import FORMS, FlowTest, fit_flow, fit_form
 from jointlaw.calibration.fit import fit_curves
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 from jointlaw.laboratory.record import TestRecord
@@ -161,6 +161,31 @@ def test_picture_of_a_fit(fit):
         is_compared = np.array([False, True, True, False, True])  # the peak at any displacement
         np.testing.assert_allclose(drawn.get_xdata(), 1e3 * test.shear)
         np.testing.assert_allclose(drawn.get_ydata()[is_compared], percent[is_compared])
+    assert [axis.get_ylabel() for axis in figure.axes] == [
+        "normal stress (MPa)", "shear stress (MPa)", "opening (mm)", *["residual (%)"] * 3
+    ]  # fmt: skip
+    assert [axis.get_xlabel() for axis in residuals] == [
+        "closure since the start of the test (µm)", *["shear displacement (mm)"] * 2
+    ]  # fmt: skip
+    (of_closure, of_held_out) = (line for line in residuals[0].lines if line.get_marker() == "o")
+    for drawn, at, measured in (
+        (of_closure, closure[1:], stress[1:]),
+        (of_held_out, *held_out[::-1]),
+    ):
+        np.testing.assert_allclose(drawn.get_xdata(), 1e6 * at)
+        percent = 100 * np.log(result.predict(at) / measured)  # as the fit compares
+        np.testing.assert_allclose(drawn.get_ydata(), percent, atol=1e-6)
+    for drawn, test in zip(
+        (line for line in residuals[2].lines if line.get_marker() == "o"),
+        (fitted, predicted),
+        strict=True,
+    ):
+        law_opening = result.predict_shear(test)[0]
+        difference = law_opening.opening[law_opening.points] - test.opening
+        np.testing.assert_allclose(drawn.get_xdata(), 1e3 * test.shear)
+        percent = 100 * difference / np.abs(test.opening).max()
+        compared = np.isfinite(drawn.get_ydata())
+        np.testing.assert_allclose(drawn.get_ydata()[compared], percent[compared], atol=1e-6)
     assert_line(closing, "measured", closure[1:], stress[1:])  # zero stress is not fitted
     assert_line(closing, "measured, not fitted", held_out[1], held_out[0])
     law = line_of(closing, "law")
@@ -254,6 +279,14 @@ def test_picture_of_a_flow_test():
     loading = by_closure["map, loading"]
     np.testing.assert_allclose(loading[:, 0], 1e6 * closure[:5], rtol=1e-3)
     np.testing.assert_allclose(loading[:, 1], 1e6 * fitted_map[:5], rtol=1e-9)
+    for name, form in FORMS.items():  # as the literature writes them
+        (a, b) = fit_form(form, stress[:4], aperture[:4])
+        expected = {
+            "Bandis": lambda s, a=a, b=b: a / (1 + 9 * s / b),
+            "semi-logarithm": lambda s, a=a, b=b: a - b * np.log(s),
+            "power law": lambda s, a=a, b=b: a * (s / 1e6) ** -b,
+        }[name]
+        np.testing.assert_allclose(1e-6 * curve_of[name][:, 1], expected(stress[:5]), rtol=1e-6)
     labels = [text.get_text() for text in over_closure.get_legend().get_texts()]
     expected = {"map, loading", "map, unloading", "measured, fitted", "measured, predicted"}
     assert expected <= {*labels}
@@ -430,6 +463,72 @@ def test_picture_of_blocks(record, monkeypatch):
     assert title == "known motion"
     (note,) = (text.get_text() for text in axes.texts if text.get_gid() == "note")
     assert note.startswith(f"t = {run.times[-1]:.2f} s")
+
+
+def hue_and_saturation(colour):
+    """Hue in degrees and saturation of a colour."""
+    hue, saturation, _ = rgb_to_hsv(to_rgba(colour)[:3])
+    return 360 * hue, saturation
+
+
+def test_colours_and_line_styles_of_the_legend():
+    """As a reader expects them: stuck black, partly sliding yellow, sliding red, open blue."""
+    colours = {state: hue_and_saturation(colour) for state, (colour, _) in JOINT_STATES.items()}
+    assert colours["stuck"][1] < 0.1
+    assert max(to_rgba(JOINT_STATES["stuck"][0])[:3]) < 0.3
+    for state, low, high in (("partly sliding", 40, 60), ("sliding", -1, 15), ("open", 180, 220)):
+        assert low < colours[state][0] < high, state
+        assert colours[state][1] > 0.5
+    styles = {state: style for state, (_, style) in JOINT_STATES.items()}
+    assert styles == {"stuck": "-", "partly sliding": "-", "sliding": "-", "open": "--"}
+    green, purple = (hue_and_saturation(colour)[0] for colour in BOLT_COLOURS.values())
+    assert [*BOLT_COLOURS] == ["bolt", "bolt at its capacity"]
+    assert 130 < green < 170
+    assert 280 < purple < 320
+    assert 200 < hue_and_saturation(block_pictures.WATER_COLOUR)[0] < 230
+
+
+def test_handles_of_the_legend():
+    """Lines of the legend have the colours and styles of what they name."""
+    with_bolts = (
+        SCENE
+        + "[water]\ntable = [[-9.0, -0.2], [9.0, -0.2]]\n"
+        + "[[bolt]]\n"
+        + lines(**{"from": [2.0, 0.8], "to": [2.0, -0.8]}, stiffness=1e8, capacity=1e5)
+    )
+    sim = Simulation(parse(with_bolts, "known"))
+    pictures = Pictures(RunRecord(sim), marked=np.array([False, True, False]))
+    figure, axes = pictures.figure()
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    handles = dict(zip(texts, figure.legends[0].get_lines(), strict=True))
+    for state, (colour, style) in JOINT_STATES.items():
+        assert same_color(handles[f"joint {state}"].get_color(), colour)
+        assert handles[f"joint {state}"].get_linestyle() == style
+    assert same_color(handles["water table"].get_color(), block_pictures.WATER_COLOUR)
+    assert handles["water table"].get_linestyle() == "-."
+    for label, colour in BOLT_COLOURS.items():
+        assert same_color(handles[label].get_color(), colour)
+        assert handles[label].get_linewidth() == 2.5
+    assert same_color(handles["unstable block"].get_color(), block_pictures.MARKED_COLOUR)
+    pictures.draw(axes, 0)
+    (water,) = axes.lines
+    np.testing.assert_allclose(water.get_xydata(), [[-9.0, -0.2], [9.0, -0.2]])
+    assert same_color(water.get_color(), block_pictures.WATER_COLOUR)
+    names = {text.get_text(): text.get_position() for text in axes.texts}
+    for name, place in (("base", (0.0, -0.5)), ("left", STARTS[0]), ("right", STARTS[1])):
+        assert names[name] == pytest.approx(place, abs=1e-3)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
+
+
+def test_the_legend_has_an_arrow_of_displacements(record):
+    run, _ = record
+    figure, _ = Pictures(run).figure()
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    handles = dict(zip(texts, figure.legends[0].get_lines(), strict=True))
+    (label,) = (text for text in texts if text.startswith("displacement, drawn ×"))
+    assert handles[label].get_marker() == ">"
+    assert same_color(handles[label].get_color(), "k")
+    assert handles[label].get_linewidth() == 1.0
 
 
 def test_picture_of_bolts(monkeypatch):

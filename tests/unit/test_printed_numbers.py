@@ -5,6 +5,7 @@ of a text with their units, and converts them by a table of this file. Angles ar
 degrees, where degrees and radians differ.
 """
 
+import csv
 import json
 import math
 import re
@@ -17,6 +18,7 @@ import pytest
 
 import jointlaw as jl
 from dem_demo.cli import main as run_blocks
+from dem_demo.studies import ablate
 from jointlaw.accuracy import slip as slip_tests
 from jointlaw.accuracy import suite
 from jointlaw.calibration import datasets, field
@@ -28,6 +30,7 @@ from jointlaw.cli import card, scan
 from jointlaw.cli import field as field_command
 from jointlaw.cli import fit as fit_command
 from jointlaw.cli.main import main
+from jointlaw.parameters import rock
 from jointlaw.parameters.about import About
 from jointlaw.parameters.aperture import Aperture
 from jointlaw.surface.faces import CompositeSurface
@@ -394,3 +397,95 @@ def test_laws_of_a_comparison_are_printed_in_degrees_and_millimetres(monkeypatch
     run_blocks(["compare", "slope"])
     line = capsys.readouterr().out.splitlines()[0]
     assert "40.0 degrees at the peak, 30.0 after 2.5 mm" in line
+
+
+def test_results_of_an_ablation(tmp_path):
+    scene = SimpleNamespace(
+        shear=[(0, 1)], blocks=[SimpleNamespace(name="slab")], rocks=["slab"], title="whole"
+    )
+    series = {"slab: normal_Pa": np.array([2e6, 2e6]), "slab: shear_Pa": np.array([0.0, -2e6])}
+    record = SimpleNamespace(
+        scene=scene, series=lambda name: series[name], distances=np.array([0.5, np.nan, 2.0])
+    )
+    summary = {
+        "slip": [{"block": "slab", "slip_angle": 31.0}],
+        "rocks": [{"rock": "slab", "state": "failed", "displacement_m": 0.3}],
+        "energy_J": {"friction": 4200.0}, "max_energy_error": 1e-5,
+    }  # fmt: skip
+    results = ablate._results(record, summary)
+    assert results == {
+        "slab, slips at_deg": 31.0,
+        "slab, peak friction_deg": pytest.approx(45.0),
+        "slab, state": "failed",
+        "slab, displacement_m": 0.3,
+        "largest displacement_m": 2.0,
+        "friction_kJ": 4.2,
+        "energy error_1": 1e-5,
+    }
+    row = {"variant": "whole scene", "note": "", "cpu_s": 2.0, "time_ratio": 1.0, "steps": 7}
+    row |= results | {"time_step_s": 1e-4}
+    printed = ablate.write([row | {ablate.DISTANCE: 3.0}], tmp_path)
+    assert "3 mm from the whole scene" in printed
+    with (tmp_path / "ablation.csv").open(newline="") as file:
+        (written,) = csv.DictReader(file)
+    assert [*written] == [
+        "variant", *results, "distance of the ends_mm", "steps", "time_step_s", "cpu_s",
+        "time_ratio", "note",
+    ]  # fmt: skip
+    assert float(written["time_step_s"]) == 1e-4
+    assert written["steps"] == "7"
+
+
+def test_distance_of_a_variant_is_in_millimetres(monkeypatch):
+    def run(name, build_variant, until):
+        motion = np.zeros((1, 3, 2))
+        motion[0, :2, 1] = [0.0, 0.0] if "whole" in name else [3e-3, 4e-3]
+        return {"variant": name, "cpu_s": 1.0, "note": ""}, SimpleNamespace(motion=motion)
+
+    monkeypatch.setattr(ablate, "_run", run)
+    monkeypatch.setattr(ablate, "variants", lambda *_: [("without water", None)])
+    _, variant, _ = ablate.ablate(None, None)
+    assert variant["distance of the ends_mm"] == pytest.approx(5.0)
+
+
+# ------------------------------------------------------------------------------- plausible values
+
+PLAUSIBLE = {  # of rock, in SI units, and the same or another value in a wrong unit
+    "mu": ([0.0, 0.7], [35.0]),
+    "friction": ([0.0, 0.7], [35.0]),
+    "normal_stiffness": ([1e10], [10.0]),
+    "shear_stiffness": ([1e9], [1.0]),
+    "stiffness at 1 MPa": ([3e10], [30.0]),
+    "beta": ([1e-9, 1e-4], [0.0, 0.1]),
+    "overlap": ([0.0, 1e-4, 0.1], [0.3]),
+    "K": ([1e5, 2e10], [20.0]),
+    "asperity_density": ([0.1, 1e6], [1e-4]),
+    "a": ([1.5, 4.0], [0.5]),
+    "closure": ([5e-9, 50e-6], [0.05, 50.0]),
+    "shear displacement": ([1e-3, 0.5], [5e-9, 5.0]),
+    "shear stress": ([1e6, 1e9], [1.0, 1e10]),
+    "stress": ([1e6, 1e9], [1.0, 1e10]),
+    "normal stress": ([1e6, 1e9], [1.0, 1e10]),
+    "peak shear stress over normal stress": ([0.7, 10.0], [1e-3, 1e3]),
+    "opening over shear displacement": ([0.0, 0.3], [30.0]),
+    "plane": ([0.0, 1.57, -3.0], [90.0]),
+}
+UNITS_OF_RANGES = {
+    "m": ("beta", "overlap", "closure", "shear displacement"),
+    "Pa": ("stress", "shear stress", "normal stress"),
+    "Pa/m": ("normal_stiffness", "shear_stiffness", "stiffness at 1 MPa"),
+    "/m2": ("asperity_density",), "rad": ("plane",), "Pa m^(1-eta)": ("K",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", rock.RANGES)
+def test_plausible_values_of_rock(name):
+    accepted, refused = PLAUSIBLE[name]
+    for value in accepted:
+        rock.require_rock({name: value})
+    units = [unit for unit, names in UNITS_OF_RANGES.items() if name in names]
+    for value in refused:
+        with pytest.raises(ValueError, match=re.escape(name)) as error:
+            rock.require_rock({name: value})
+        bounds = rf"({NUMBER}) to ({NUMBER})" + "".join(f" {re.escape(unit)}" for unit in units)
+        assert re.search(bounds, str(error.value)), str(error.value)

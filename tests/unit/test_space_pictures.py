@@ -307,6 +307,7 @@ def test_scale_bar_compass_and_note(drawing, moved, monkeypatch):
     """Artists below the solids, in metres of the picture."""
     monkeypatch.setattr(SpacePictures, "render", lambda *_: np.zeros((4, 4, 4)))
     pictures = SpacePictures(drawing, [drawing.as_drawn, moved])
+    pictures.low = pictures.low - [2.0, 0.0]  # not symmetric
     figure, axes = pictures.figure()
     pictures.draw(axes, 1, "t = 0.25 s")
     (image,) = axes.images

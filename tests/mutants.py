@@ -33,7 +33,6 @@ import subprocess
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 
 from executed import ExecutedMap
@@ -336,13 +335,7 @@ def try_together(copies, faults, detected_by, marks, able, limit):
     while group := compatible([one for one in faults if one not in detected_by]):
         files = sorted({file for fault in group for file in able[fault]})
         print(f"{len(group)} faults at once, {len(files)} test files", flush=True)
-        shares = [files[i :: len(copies)] for i in range(len(copies))]
-        with ThreadPoolExecutor(len(copies)) as pool:
-            run = partial(failing_tests, faults=group, arguments=["-m", marks])
-            results = pool.map(
-                lambda copy, share: run(copy, tests=share) if share else [], copies, shares
-            )
-            failed = list(itertools.chain(*results))
+        failed = failing_tests_in_parallel(copies, group, marks, files)
         copy = copies[0]
         if failed:
             without_fault = failing_tests(copy, [], ["-m", marks], failed)
@@ -353,6 +346,17 @@ def try_together(copies, faults, detected_by, marks, able, limit):
             detected_by[fault] = by[0] if by else ""
             print(f"{fault.kind} {fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
                   detected_by[fault] or f"SURVIVED {marks}", flush=True)  # fmt: skip
+
+
+def failing_tests_in_parallel(copies, faults, marks, files):
+    """Tests of these files that fail with these faults; each copy runs a share of the files."""
+    shares = [files[i :: len(copies)] for i in range(len(copies))]
+
+    def run(copy, share):
+        return failing_tests(copy, faults, ["-m", marks], share) if share else []
+
+    with ThreadPoolExecutor(len(copies)) as pool:
+        return [*itertools.chain(*pool.map(run, copies, shares))]
 
 
 def report(by_kind, faults, detected_by):

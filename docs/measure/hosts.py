@@ -32,6 +32,7 @@ ENVIRONMENT = Path(os.environ.get("ENV", sys.prefix))
 RESOLUTIONS = "fast", "balanced", "fine"
 MINDLIN = "granular, mindlin"
 RECORD_SIZE = 12  # numbers of a joint beside its state: EXTRA_SIZE in jointlawplugin.cpp
+FLOAT_FOLDER = "floats"  # in FOLDER, with the plug-in that stores slider forces as float
 COULOMB = jl.CoulombLaw(normal_stiffness=1.0e9, shear_stiffness=0.83e9, friction=0.4)
 SCALE_STEPS = 20  # steps that settle, and steps that are timed; half as many after a restart
 CLUSTER_CONTACTS = 1e8
@@ -232,30 +233,36 @@ def lammps(folder: Path, rounds=3, steps=40, settle=40, repeat=2):
 
     Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after
     another in every round; the shortest time of all rounds counts. Processor time of one process,
-    as LAMMPS counts it.
+    as LAMMPS counts it. Float storage: a plug-in built with -DJOINTLAW_FLOAT_SLIDERS.
     """
     prepare_packing(folder)
-    balanced = lammps_law("balanced")
+    build_plugin(folder / FLOAT_FOLDER, "-DJOINTLAW_FLOAT_SLIDERS")
+    fast, balanced, fine = (lammps_law(resolution) for resolution in RESOLUTIONS)
     laws = {
-        "jointlaw, Coulomb": (COULOMB, ""),
-        "jointlaw, fast": (lammps_law("fast"), ""),
-        "jointlaw, balanced": (balanced, ""),
-        "jointlaw, balanced, with damping": (balanced, "damping 0.5"),
-        "jointlaw, balanced, with yielding, degradation and bond": (with_all_parts(balanced), ""),
-        "jointlaw, fine": (lammps_law("fine"), ""),
-    }
+        "jointlaw, Coulomb": (COULOMB, "", False),
+        "jointlaw, fast": (fast, "", False),
+        "jointlaw, fast, float storage": (fast, "", True),
+        "jointlaw, balanced": (balanced, "", False),
+        "jointlaw, balanced, float storage": (balanced, "", True),
+        "jointlaw, balanced, with damping": (balanced, "damping 0.5", False),
+        "jointlaw, balanced, with yielding, degradation and bond":
+            (with_all_parts(balanced), "", False),
+        "jointlaw, fine": (fine, "", False),
+        "jointlaw, fine, float storage": (fine, "", True),
+    }  # fmt: skip
     styles = dict(LAMMPS_STYLES)
     sizes = {}
-    for index, (name, (law, keywords)) in enumerate(laws.items()):
+    for index, (name, (law, keywords, stores_floats)) in enumerate(laws.items()):
         file = f"law-{index}.jlaw"
         (folder / file).write_text(table_text(law))
         commands = [
-            "plugin load ./jointlawplugin.so",
+            f"plugin load ./{FLOAT_FOLDER if stores_floats else '.'}/jointlawplugin.so",
             f"pair_style jointlaw opening 5e-4 {keywords}",
             f"pair_coeff * * {file}",
         ]
         styles[name] = "on", "\n".join(commands)
-        sizes[name] = 8 * (law.state_size + RECORD_SIZE)
+        state_size = law.tables.slider_packing.packed_rows if stores_floats else law.state_size
+        sizes[name] = 8 * (state_size + RECORD_SIZE)
     runs = defaultdict(list)
     for _ in range(rounds):
         for name, (newton, style) in styles.items():
@@ -298,11 +305,16 @@ def lammps_law(resolution):
 
 def prepare_packing(folder):
     """Build the plug-in, export the law at "balanced", and pack the spheres."""
+    build_plugin(folder)
+    run_lammps(folder, PACK_SCRIPT)
+
+
+def build_plugin(folder, flags=""):
+    """Export the law at "balanced" to a folder, and build the plug-in there."""
     export_lammps(lammps_law("balanced"), folder, "rock")
-    environment = {**os.environ, "ENV": str(ENVIRONMENT)}
+    environment = {**os.environ, "ENV": str(ENVIRONMENT), "CXXFLAGS": flags}
     subprocess.run(["./build.sh"], cwd=folder, env=environment, check=True,
                    stdout=subprocess.DEVNULL)  # fmt: skip
-    run_lammps(folder, PACK_SCRIPT)
 
 
 def run_lammps(folder, script, processors=1):

@@ -17,10 +17,11 @@
 // from the positions at two steps, not from velocities, so that motion without velocity (fix deform,
 // displace_atoms) shears joints, too.
 //
-// A step has three stages. For each owner the contacts are found, and their increments are appended to
-// a list (find_*_contacts, prepare_step). After about GROUP joints the law advances all of them in one
-// call that is vectorised over joints (perform_steps). Then forces are added to the atoms
-// (apply_forces), and joints that were not found again are deleted (end_joint).
+// A step has four stages, of about GROUP joints each time. For each owner the contacts are found, with
+// the joint of each (find_*_contacts); for spheres this only collects numbers (collect_sphere_step), from
+// which the increments follow for LANES joints at once (prepare_sphere_steps). Then the law advances all
+// joints of the group in one call that is vectorised over joints (perform_steps), forces are added to the
+// atoms (apply_forces), and joints that were not found again are deleted (end_joint).
 //
 // MIT licence; binaries linked with LAMMPS may be distributed under the GPL 2 of LAMMPS.
 #include "comm.h"
@@ -49,19 +50,21 @@
 
 namespace LAMMPS_NS {
 
+// Inlined everywhere, since loops over lanes are vectorised only if they call no function
+#define INLINE __attribute__((always_inline)) inline
 using Vector = std::array<double, 3>;
-static double dot(const Vector &a, const Vector &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-static Vector cross(const Vector &a, const Vector &b)
+INLINE static double dot(const Vector &a, const Vector &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+INLINE static Vector cross(const Vector &a, const Vector &b)
 {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-static Vector sum(const Vector &a, double factor, const Vector &b)    // a + factor b
+INLINE static Vector sum(const Vector &a, double factor, const Vector &b)    // a + factor b
 {
   return {a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]};
 }
-static Vector times(double factor, const Vector &a) { return {factor * a[0], factor * a[1], factor * a[2]}; }
+INLINE static Vector times(double factor, const Vector &a) { return {factor * a[0], factor * a[1], factor * a[2]}; }
 static Vector vector(const double *x) { return {x[0], x[1], x[2]}; }
-static Vector unit(const Vector &a) { return times(1.0 / sqrt(dot(a, a)), a); }
+INLINE static Vector unit(const Vector &a) { return times(1.0 / sqrt(dot(a, a)), a); }
 // The axis of the box that is most nearly perpendicular to n, projected on the plane of n
 static Vector perpendicular(const Vector &n)
 {
@@ -84,17 +87,84 @@ static uint64_t hashed(uint64_t value, const char *text)
 struct Rotation {
   Vector vector;
   double sine, cosine;    // sin(x)/x and (1 - cos(x))/x^2 of the angle x
-  explicit Rotation(const Vector &v) : vector(v)
+  INLINE explicit Rotation(const Vector &v) : vector(v)
   {
     const double x = dot(v, v);
     sine = 1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0 - x * (1.0 / 5040.0 - x * (1.0 / 362880.0))));
     cosine = 0.5 - x * (1.0 / 24.0 - x * (1.0 / 720.0 - x * (1.0 / 40320.0 - x * (1.0 / 3628800.0))));
   }
 };
-static Vector rotated(const Vector &a, const Rotation &rotation)
+INLINE static Vector rotated(const Vector &a, const Rotation &rotation)
 {
   const Vector across = cross(rotation.vector, a);
   return sum(sum(a, rotation.sine, across), rotation.cosine, cross(rotation.vector, across));
+}
+
+// Area of a joint between spheres or points of these radii; `area`: of every joint, or 0
+static double area_between(double area, double radius_i, double radius_j)
+{
+  const double r = radius_i < radius_j ? radius_i : radius_j;
+  return area > 0.0 ? area : 3.14159265358979323846 * r * r;
+}
+
+// Geometry of the steps of LANES joints. Each field is an array, so that loops over lanes are vectorised.
+static constexpr int LANES = 8;
+using Lane = double[LANES];
+struct Lanes {
+  Lane n[3], axis2[3], axis3[3];    // axes of the joint: axis 1 is -n, motion of j into i closes
+  Lane arm_i[3], arm_j[3];          // from the centres to the contact
+  Lane closure, area, increment[3];
+  Lane slide[3];    // velocity of the surface of j relative to i: of new joints, and for damping
+  Lane traction[3], damping_force;
+  Lane force[3], torque_i[3], torque_j[3];    // force on j
+  // collected for spheres: separation is from the centre of i to the centre of j
+  Lane radius_i, radius_j, spin_i[3], spin_j[3], separation[3], last_separation[3], last_closure;
+};
+INLINE static Vector get(const Lane *field, int l) { return {field[0][l], field[1][l], field[2][l]}; }
+INLINE static void set(Lane *field, int l, const Vector &a)
+{
+  field[0][l] = a[0], field[1][l] = a[1], field[2][l] = a[2];
+}
+
+// Geometry and increments of steps of spheres, in all lanes. Slip is the motion of the surface of the partner
+// relative to the surface of the owner since the last step: the change of the separation beyond the mean
+// rotation of both, which rotates a contact without slip, and the rolling of unequal spheres on one another.
+static void move_spheres(Lanes &o, double dt, double gap, double area)
+{
+  for (int l = 0; l < LANES; l++) {
+    const Vector wi = get(o.spin_i, l), wj = get(o.spin_j, l), d = get(o.separation, l);
+    const double radius_i = o.radius_i[l], radius_j = o.radius_j[l], touch = radius_i + radius_j;
+    const double r = sqrt(dot(d, d));
+    const Vector n = times(1.0 / r, d), arm = times(radius_i - 0.5 * (touch - r), n);
+    const Rotation rotation(times(0.5 * dt, sum(wi, 1.0, wj)));
+    // axis 2 rotates with the spheres and follows the normal
+    Vector axis2 = rotated(get(o.axis2, l), rotation);
+    axis2 = unit(sum(axis2, -dot(axis2, n), n));
+    const Vector axis3 = cross(axis2, n);
+    Vector slip = sum(d, -1.0, rotated(get(o.last_separation, l), rotation));
+    slip = sum(slip, -0.5 * dt * (radius_i - radius_j), cross(sum(wi, -1.0, wj), n));
+    o.closure[l] = touch - gap - r;
+    o.area[l] = area_between(area, radius_i, radius_j);
+    set(o.n, l, n);
+    set(o.axis2, l, axis2);
+    set(o.axis3, l, axis3);
+    set(o.arm_i, l, arm);
+    set(o.arm_j, l, sum(arm, -1.0, d));
+    set(o.increment, l, {o.closure[l] - o.last_closure[l], dot(slip, axis2), dot(slip, axis3)});
+  }
+}
+
+// Forces and torques from tractions and damping forces, in all lanes
+static void compute_forces(Lanes &o)
+{
+  for (int l = 0; l < LANES; l++) {
+    const Vector shear = sum(times(o.traction[1][l], get(o.axis2, l)), o.traction[2][l], get(o.axis3, l));
+    const double normal_force = o.area[l] * o.traction[0][l] + o.damping_force[l];
+    const Vector force = sum(times(normal_force, get(o.n, l)), -o.area[l], shear);
+    set(o.force, l, force);
+    set(o.torque_i, l, cross(get(o.arm_i, l), force));
+    set(o.torque_j, l, cross(get(o.arm_j, l), force));
+  }
 }
 
 // Closure under this normal stress (Pa), or a lower one if yielding asperities do not reach it
@@ -166,7 +236,7 @@ class PairJointlaw : public Pair {
     int64_t id;    // hash of the fingerprint
     NormalStiffness normal_stiffness;
   };
-  // A contact or possible contact of owner i; the normal n points from i to j
+  // A contact or possible contact of owner i in a plane; the normal n points from i to j
   struct Contact {
     int i, j;
     tagint key;    // identifies the partner
@@ -174,17 +244,18 @@ class PairJointlaw : public Pair {
     Vector n, arm_i, arm_j;    // arms: from the centres to the contact
     Vector separation;         // from the centre of i to the centre of j
   };
-  // The step of a joint
+  // The step of a joint of owner i and partner j
   struct Step {
-    Contact contact;
+    int i, j;
     const Law *law;
     int index, flag;    // index in the joints of the owner; index in joint_flags, -1 for a new joint
     bool is_still;      // of a setup: nothing has moved since the last step of the joint
-    Vector slide, axis2, axis3;
+    double *state;      // valid from perform_steps on
   };
-  // An owner in this step: its number of joints before it, and the index of their first flag
+  // An owner in this step: its number of joints before it, the index of their first flag, and the number
+  // of steps in the list up to its last one
   struct Visit {
-    int i, joint_count, first_flag;
+    int i, joint_count, first_flag, end_step;
   };
   enum { NOT_FOUND, IN_CONTACT, SEPARATED };    // flags of existing joints
   static constexpr size_t GROUP = 64;    // joints per call of the law, or a few more
@@ -224,13 +295,15 @@ class PairJointlaw : public Pair {
   int rows = 0, size = 0;    // doubles of the largest state, of a joint
   std::vector<double> largest;    // radius (m) of each type in this run, for which contacts are found
   std::vector<int> first, candidates;    // possible partners of each atom in the neighbour list
+  std::vector<int> last_index;    // of each candidate: index of its joint in the last step
   std::vector<Opposite> opposites;
   std::vector<Step> steps;
+  std::vector<Lanes> lanes;    // of the steps
   std::vector<Visit> visits;
   std::vector<tagint> new_atoms;    // IDs of atoms that appeared since the last step, in order
   double rounding = 0.0;            // m, of positions between two runs
   std::vector<char> joint_flags;
-  std::vector<double> states, increments, tractions;    // of the steps
+  std::vector<double> states, increments, tractions;    // of the steps, a joint after the other
   std::vector<double> scratch, stiffness;    // N/m, sum over the joints of each atom
   double warned_count = 0.0, max_time_step = 0.0, reported_time_step = 0.0, warned_time_step = 0.0;
   bool is_last_check = false;
@@ -255,25 +328,33 @@ class PairJointlaw : public Pair {
   {
     return !new_atoms.empty() && std::binary_search(new_atoms.begin(), new_atoms.end(), atom->tag[i]);
   }
-  bool belongs_to(const double *extra, const Contact &c, const Law *law) const
+  bool belongs_to(const double *extra, int i, int j, const Law *law) const
   {
-    return to_integer(extra[LAW]) == law->id && to_integer(extra[OWNER_KEY]) == key_of(c.i)
-        && !is_new_atom(c.j);
+    return to_integer(extra[LAW]) == law->id && to_integer(extra[OWNER_KEY]) == key_of(i) && !is_new_atom(j);
   }
-  double area_of(int i, int j) const
-  {
-    const double r = std::min(atom->radius[i], atom->radius[j]);
-    return area > 0.0 ? area : 3.14159265358979323846 * r * r;
-  }
+  double area_of(int i, int j) const { return area_between(area, atom->radius[i], atom->radius[j]); }
+  double time_step() const { return update->setupflag ? 0.0 : update->dt; }    // a setup is not a time step
   tagint key_of(int i) const { return planar ? atom->molecule[i] : atom->tag[i]; }
   void list_candidates();
-  void find_sphere_contacts(int, const int *, int);
+  int find_joint(int, int, tagint, const Law *, int) const;
+  double touching_closure(const Law *, double) const;
+  int create_joint(int, tagint, const Law *, const Vector &);
+  Vector surface_velocity(int, int, const Vector &, const Vector &) const;
+  void append_step(int, int, const Law *, int, bool);
+  void find_sphere_contacts(int, int, int);
+  void collect_sphere_step(const Vector &);
+  void prepare_sphere_steps(int);
   void find_body_contacts(int, const int *, int);
   bool surface_distance(const Opposite &, double, double &) const;
-  bool find_slip(const Contact &, const double *, const int *, int, const Rotation &, double, Vector &) const;
+  bool find_slip(const Contact &, const double *, const int *, int, Vector &) const;
   void prepare_step(const Contact &, const int *, int);
-  void perform_steps();
-  void apply_forces(const Step &, double *, const double *);
+  bool is_at_rest(const Lanes &, int) const;
+  void keep_still(Step &, Lanes &, int);
+  void perform_steps(int);
+  void end_visits(int);
+  void apply_forces(int);
+  double damping_force(const Step &, const Lanes &, int);
+  void tally(const Step &, const Lanes &, int);
   void end_joint(int, int, bool);
   void refuse_other_commands() const;
   double expected_frequency_squared() const;
@@ -591,6 +672,7 @@ void PairJointlaw::list_candidates()
     }
   }
   first[list->inum] = static_cast<int>(candidates.size());
+  last_index.assign(candidates.size(), 0);
 }
 
 // Note the atoms that appeared since the last step, which may have the ID of a deleted atom
@@ -621,13 +703,14 @@ void PairJointlaw::compute(int eflag, int vflag)
     const int count = first[ii + 1] - first[ii];
     AtomJoints &own = joints_of->of[i];
     if (count == 0 && own.n == 0) continue;
-    visits.push_back({i, own.n, static_cast<int>(joint_flags.size())});
+    visits.push_back({i, own.n, static_cast<int>(joint_flags.size()), 0});
     joint_flags.resize(joint_flags.size() + own.n, NOT_FOUND);
     if (planar) find_body_contacts(i, partners, count);
-    else find_sphere_contacts(i, partners, count);
-    if (steps.size() >= GROUP) perform_steps();
+    else find_sphere_contacts(i, first[ii], first[ii + 1]);
+    visits.back().end_step = static_cast<int>(steps.size());
+    if (steps.size() >= GROUP) perform_steps(steps.size() / LANES * LANES);
   }
-  perform_steps();
+  perform_steps(steps.size());
   new_atoms.clear();
   if (check) check_joints();    // collective: also on processes without atoms
   if (eflag_either) {
@@ -641,25 +724,135 @@ void PairJointlaw::compute(int eflag, int vflag)
   if (has_local_output && (update->setupflag || update->ntimestep == output->next)) collect_outputs();
 }
 
-void PairJointlaw::find_sphere_contacts(int i, const int *partners, int count)
+// Index of the joint of owner i and partner j, or its number of joints if there is none; `guess`: where it
+// may be. The joint of another law or other bodies is not found, and ends after this step.
+int PairJointlaw::find_joint(int i, int j, tagint key, const Law *law, int guess) const
 {
-  const Vector here = vector(atom->x[i]);
-  const double radius = atom->radius[i];
-  for (int k = 0; k < count; k++) {
-    const int j = partners[k];
-    const Vector d = sum(vector(atom->x[j]), -1.0, here);
+  const AtomJoints &own = joints_of->of[i];
+  const auto has_key = [&](int index) {
+    return to_integer(own.joint(index, size)[rows + PARTNER_KEY]) == key;
+  };
+  int index = guess;
+  if (!(index < own.n && has_key(index)))
+    for (index = 0; index < own.n && !has_key(index);) index++;
+  return index < own.n && belongs_to(own.joint(index, size) + rows, i, j, law) ? index : own.n;
+}
+
+// Closure beyond which a joint begins; arm: from the centre of the owner to the contact
+double PairJointlaw::touching_closure(const Law *law, double arm) const
+{
+  // bodies that touch at the start of a run do so except for rounding, and may have a bond
+  return update->setupflag && jlaw_has_damage(law->law) ? -1e-9 * arm : 0.0;
+}
+
+// Begin a joint of owner i with normal n; returns its index
+int PairJointlaw::create_joint(int i, tagint key, const Law *law, const Vector &n)
+{
+  AtomJoints &own = joints_of->of[i];
+  const int index = own.n;
+  own.resize(index + 1, size);
+  double *extra = own.joint(index, size) + rows;
+  extra[PARTNER_KEY] = from_integer(key);
+  extra[OWNER_KEY] = from_integer(key_of(i));
+  extra[LAW] = from_integer(law->id);
+  const Vector axis = perpendicular(n);
+  std::copy(axis.begin(), axis.end(), extra + AXIS2);
+  if (!update->setupflag) jlaw_break_bond(law->law, own.joint(index, size));    // touch again after separation
+  return index;
+}
+
+// Velocity of the surface of j relative to the surface of i at their contact
+Vector PairJointlaw::surface_velocity(int i, int j, const Vector &arm_i, const Vector &arm_j) const
+{
+  const Vector vi = sum(vector(atom->v[i]), 1.0, cross(vector(atom->omega[i]), arm_i));
+  const Vector vj = sum(vector(atom->v[j]), 1.0, cross(vector(atom->omega[j]), arm_j));
+  return sum(vj, -1.0, vi);
+}
+
+// Append a step to the list; the caller fills the last lane
+void PairJointlaw::append_step(int i, int j, const Law *law, int index, bool fresh)
+{
+  const int flag = fresh ? -1 : visits.back().first_flag + index;
+  if (!fresh) joint_flags[flag] = IN_CONTACT;
+  if (steps.size() == lanes.size() * LANES) lanes.emplace_back();
+  steps.push_back({i, j, law, index, flag, false, nullptr});
+}
+
+void PairJointlaw::find_sphere_contacts(int i, int begin, int end)
+{
+  const double *here = atom->x[i], radius = atom->radius[i];
+  for (int k = begin; k < end; k++) {
+    const int j = candidates[k];
+    const double *there = atom->x[j];
+    const Vector d = {there[0] - here[0], there[1] - here[1], there[2] - here[2]};
     const double touch = radius + atom->radius[j], rsq = dot(d, d), reach = touch - gap + opening;
     if (rsq > reach * reach) continue;
-    Contact c;
-    const double r = sqrt(rsq);
-    c.i = i, c.j = j, c.key = atom->tag[j];
-    c.n = times(1.0 / r, d);
-    c.closure = touch - gap - r;
-    c.area = area_of(i, j);
-    c.arm_i = times(radius - 0.5 * (touch - r), c.n);
-    c.arm_j = sum(c.arm_i, -1.0, d);
-    c.separation = d;
-    prepare_step(c, partners, count);
+    const Law *law = law_between(atom->type[i], atom->type[j]);
+    if (!law) continue;    // another type since the neighbour list was built
+    const tagint key = atom->tag[j];
+    int index = find_joint(i, j, key, law, last_index[k]);
+    const bool fresh = index == joints_of->of[i].n;
+    if (fresh) {
+      const double r = sqrt(rsq), arm = radius - 0.5 * (touch - r);
+      if (!(touch - gap - r > touching_closure(law, arm))) continue;
+      create_joint(i, key, law, times(1.0 / r, d));
+    }
+    last_index[k] = index;
+    append_step(i, j, law, index, fresh);
+    collect_sphere_step(d);
+  }
+}
+
+// Collect the numbers from which prepare_sphere_steps computes the last step in the list
+void PairJointlaw::collect_sphere_step(const Vector &separation)
+{
+  const size_t at = steps.size() - 1;
+  const Step &step = steps[at];
+  const int i = step.i, j = step.j, l = at % LANES;
+  const double *state = joints_of->of[i].joint(step.index, size), *extra = state + rows;
+  const double *wi = atom->omega[i], *wj = atom->omega[j];
+  Lanes &o = lanes[at / LANES];
+  o.radius_i[l] = atom->radius[i];
+  o.radius_j[l] = atom->radius[j];
+  o.last_closure[l] = state[0];
+  for (int k = 0; k < 3; k++) {
+    o.spin_i[k][l] = wi[k];
+    o.spin_j[k][l] = wj[k];
+    o.separation[k][l] = separation[k];
+    o.last_separation[k][l] = extra[SEPARATION + k];
+    o.axis2[k][l] = extra[AXIS2 + k];
+  }
+}
+
+// Geometry and increments of the first steps in the list
+void PairJointlaw::prepare_sphere_steps(int count)
+{
+  const double dt = time_step();
+  for (int b = 0; b * LANES < count; b++) move_spheres(lanes[b], dt, gap, area);
+  for (int at = 0; at < count; at++) {
+    Step &step = steps[at];
+    Lanes &o = lanes[at / LANES];
+    const int l = at % LANES;
+    const bool fresh = step.flag < 0;
+    double *extra = step.state + rows;
+    if (fresh || damping > 0.0) {
+      const Vector slide = surface_velocity(step.i, step.j, get(o.arm_i, l), get(o.arm_j, l));
+      set(o.slide, l, slide);
+      if (fresh) {    // there is no last separation
+        o.increment[1][l] = dt * dot(slide, get(o.axis2, l));
+        o.increment[2][l] = dt * dot(slide, get(o.axis3, l));
+      }
+    }
+    extra[JOINT_AREA] = o.area[l];
+    if (update->setupflag && !fresh && is_at_rest(o, l)) {
+      keep_still(step, o, l);
+      continue;
+    }
+    extra[PARTNER_ID] = extra[PARTNER_KEY];
+    for (int k = 0; k < 3; k++) {
+      extra[AXIS2 + k] = o.axis2[k][l];
+      extra[SEPARATION + k] = o.separation[k][l];
+    }
   }
 }
 
@@ -725,21 +918,12 @@ void PairJointlaw::find_body_contacts(int i, const int *partners, int count)
   }
 }
 
-// Slip (m) since the last step of a joint: motion of the surface of the partner relative to the surface of
-// the owner. `rotation`: the mean rotation of both, which rotates a contact of spheres without slip.
-// Returns false if it is unknown: another point of a body is opposite, and the last one is no longer a
-// neighbour.
+// Slip (m) of a point of a body since the last step of its joint: motion of the surface of the partner
+// relative to the surface of the owner. Returns false if it is unknown: another point is opposite, and the
+// last one is no longer a neighbour.
 bool PairJointlaw::find_slip(const Contact &c, const double *extra, const int *partners, int count,
-                             const Rotation &rotation, double dt, Vector &slip) const
+                             Vector &slip) const
 {
-  const Vector wi = vector(atom->omega[c.i]), wj = vector(atom->omega[c.j]);
-  const Vector last = vector(extra + SEPARATION);
-  if (!planar) {
-    const double difference = 0.5 * (dot(c.arm_i, c.n) + dot(c.arm_j, c.n));
-    slip = sum(c.separation, -1.0, rotated(last, rotation));
-    slip = sum(slip, -dt * difference, cross(sum(wi, -1.0, wj), c.n));
-    return true;
-  }
   Vector separation = c.separation;
   if (atom->tag[c.j] != to_integer(extra[PARTNER_ID])) {
     const auto is_last = [&](int k) { return atom->tag[k] == to_integer(extra[PARTNER_ID]); };
@@ -747,170 +931,211 @@ bool PairJointlaw::find_slip(const Contact &c, const double *extra, const int *p
     if (j == partners + count) return false;
     separation = sum(vector(atom->x[*j]), -1.0, vector(atom->x[c.i]));
   }
+  const Vector wi = vector(atom->omega[c.i]), wj = vector(atom->omega[c.j]);
   const Vector spin = sum(cross(wj, c.arm_j), -1.0, cross(wi, c.arm_i));
-  slip = sum(sum(separation, -1.0, last), dt, spin);
+  slip = sum(sum(separation, -1.0, vector(extra + SEPARATION)), time_step(), spin);
   return true;
 }
 
-// Append the step of a joint: its increments, from the geometry of the contact
+// Append the step of a joint in the plane: its geometry and its increments
 void PairJointlaw::prepare_step(const Contact &c, const int *partners, int count)
 {
   const int i = c.i, j = c.j;
   const bool is_setup = update->setupflag;
-  const double dt = is_setup ? 0.0 : update->dt;    // a setup is not a time step
+  const double dt = time_step();
   AtomJoints &own = joints_of->of[i];
   const Law *law = law_between(atom->type[i], atom->type[j]);
-  const Vector wi = vector(atom->omega[i]), wj = vector(atom->omega[j]);
-  const Rotation rotation(times(0.5 * dt, sum(wi, 1.0, wj)));    // in the step, the mean of both
-  int index = 0;
-  while (index < own.n && to_integer(own.joint(index, size)[rows + PARTNER_KEY]) != c.key) index++;
-  // the joint of another law or other bodies is not found again, and ends after this step
-  if (index < own.n && !belongs_to(own.joint(index, size) + rows, c, law)) index = own.n;
-  Vector slide = {0.0, 0.0, 0.0};    // velocity of the surface of j relative to i, where it is needed
-  if (index == own.n || planar || damping > 0.0) {
-    const Vector vi = sum(vector(atom->v[i]), 1.0, cross(wi, c.arm_i));
-    const Vector vj = sum(vector(atom->v[j]), 1.0, cross(wj, c.arm_j));
-    slide = sum(vj, -1.0, vi);
-  }
+  if (!law) return;    // another type since the neighbour list was built
+  int index = find_joint(i, j, c.key, law, 0);
+  const Vector slide = surface_velocity(i, j, c.arm_i, c.arm_j);
   Vector slip = times(dt, slide);
-  if (index < own.n
-      && !find_slip(c, own.joint(index, size) + rows, partners, count, rotation, dt, slip) && is_setup)
+  if (index < own.n && !find_slip(c, own.joint(index, size) + rows, partners, count, slip) && is_setup)
     index = own.n;
   const bool fresh = index == own.n;
   if (fresh) {
-    // bodies that touch at the start of a run do so except for rounding, and may have a bond
-    const double touch = jlaw_has_damage(law->law) && is_setup ? -1e-9 * sqrt(dot(c.arm_i, c.arm_i)) : 0.0;
-    if (!(c.closure > touch)) return;
-    own.resize(index + 1, size);
-    double *extra = own.joint(index, size) + rows;
-    extra[PARTNER_KEY] = from_integer(c.key);
-    extra[OWNER_KEY] = from_integer(key_of(i));
-    extra[LAW] = from_integer(law->id);
-    const Vector axis = perpendicular(c.n);
-    std::copy(axis.begin(), axis.end(), extra + AXIS2);
-    if (!is_setup) jlaw_break_bond(law->law, own.joint(index, size));    // touch again after separation
+    if (!(c.closure > touching_closure(law, sqrt(dot(c.arm_i, c.arm_i))))) return;
+    create_joint(i, c.key, law, c.n);
   }
-  const int flag = fresh ? -1 : visits.back().first_flag + index;
-  if (!fresh) joint_flags[flag] = IN_CONTACT;
+  append_step(i, j, law, index, fresh);
+  const size_t at = steps.size() - 1;
+  Lanes &o = lanes[at / LANES];
+  const int l = at % LANES;
   double *state = own.joint(index, size), *extra = state + rows;
-  extra[JOINT_AREA] = c.area;
-  Vector axis2 = vector(extra + AXIS2);
-  slip = sum(slip, -dot(slip, c.n), c.n);
-  const bool is_still = is_setup && !fresh && fabs(c.closure - state[0]) <= rounding
-      && dot(slip, slip) <= rounding * rounding;
-  if (is_still) {
-    for (int k = 0; k < 3; k++) increments.push_back(0.0);
-    steps.push_back({c, law, index, flag, is_still, slide, axis2, cross(axis2, c.n)});
+  // axis 2 rotates with the bodies about the normal
+  const Vector mean_spin = times(0.5, sum(vector(atom->omega[i]), 1.0, vector(atom->omega[j])));
+  Vector axis2 = rotated(vector(extra + AXIS2), Rotation(times(dt * dot(mean_spin, c.n), c.n)));
+  axis2 = unit(sum(axis2, -dot(axis2, c.n), c.n));
+  const Vector axis3 = cross(axis2, c.n);
+  set(o.n, l, c.n);
+  set(o.axis2, l, axis2);
+  set(o.axis3, l, axis3);
+  set(o.arm_i, l, c.arm_i);
+  set(o.arm_j, l, c.arm_j);
+  set(o.slide, l, slide);
+  set(o.increment, l, {c.closure - state[0], dot(slip, axis2), dot(slip, axis3)});
+  o.closure[l] = c.closure;
+  o.area[l] = extra[JOINT_AREA] = c.area;
+  if (is_setup && !fresh && is_at_rest(o, l)) {
+    keep_still(steps[at], o, l);
     return;
   }
-  // axis 2 rotates with the bodies (in a plane about the normal only) and follows the normal
-  axis2 = rotated(axis2, planar ? Rotation(times(dot(rotation.vector, c.n), c.n)) : rotation);
-  axis2 = unit(sum(axis2, -dot(axis2, c.n), c.n));
-  const Vector axis3 = cross(axis2, c.n);    // axis 1 is -n: motion of j into i closes
   extra[PARTNER_ID] = from_integer(atom->tag[j]);
   std::copy(axis2.begin(), axis2.end(), extra + AXIS2);
   std::copy(c.separation.begin(), c.separation.end(), extra + SEPARATION);
-  for (const double d : {c.closure - state[0], dot(slip, axis2), dot(slip, axis3)}) increments.push_back(d);
-  steps.push_back({c, law, index, flag, is_still, slide, axis2, axis3});
 }
 
-// Advance all joints in the list, in groups of one law; then delete ended joints
-void PairJointlaw::perform_steps()
+// Whether increments are only rounding of positions
+bool PairJointlaw::is_at_rest(const Lanes &o, int l) const
 {
-  tractions.resize(3 * steps.size());
-  states.resize(rows * steps.size());
-  for (size_t first = 0, n; first < steps.size(); first += n) {
-    const jlaw_law *law = steps[first].law->law;
+  const double d1 = o.increment[0][l], d2 = o.increment[1][l], d3 = o.increment[2][l];
+  return fabs(d1) <= rounding && d2 * d2 + d3 * d3 <= rounding * rounding;
+}
+
+// Take no step; axis 2 remains as in the record of the joint
+void PairJointlaw::keep_still(Step &step, Lanes &o, int l)
+{
+  const double *state = joints_of->of[step.i].joint(step.index, size);
+  const Vector axis2 = vector(state + rows + AXIS2);
+  step.is_still = true;
+  set(o.axis2, l, axis2);
+  set(o.axis3, l, cross(axis2, get(o.n, l)));
+  set(o.increment, l, {0.0, 0.0, 0.0});
+}
+
+// Advance the joints of the first steps in the list, in groups of one law, and add their forces
+void PairJointlaw::perform_steps(int count)
+{
+  for (int at = 0; at < count; at++) steps[at].state = joints_of->of[steps[at].i].joint(steps[at].index, size);
+  if (!planar) prepare_sphere_steps(count);
+  increments.resize(3 * count);
+  tractions.resize(3 * count);
+  states.resize(rows * count);
+  for (int at = 0; at < count; at++)
+    for (int k = 0; k < 3; k++) increments[3 * at + k] = lanes[at / LANES].increment[k][at % LANES];
+  for (int first = 0, n; first < count; first += n) {
+    const Step *group = steps.data() + first;
+    const jlaw_law *law = group->law->law;
     const size_t bytes = jlaw_state_size(law) * sizeof(double);
-    const bool is_still = steps[first].is_still;
-    const auto of = [&](size_t k) {
-      return joints_of->of[steps[first + k].contact.i].joint(steps[first + k].index, size);
-    };
+    const bool is_still = group->is_still;
     const auto is_in_group = [&](const Step &step) { return step.law->law == law && step.is_still == is_still; };
-    for (n = 0; first + n < steps.size() && is_in_group(steps[first + n]); n++)
-      memcpy(states.data() + rows * n, of(n), bytes);
-    double *d = increments.data() + 3 * first, *F = tractions.data();
-    for (size_t k = 0; is_still && k < n; k++) jlaw_traction(law, of(k), F + 3 * k);
-    const size_t done = is_still ? n : jlaw_update_many(law, states.data(), rows, d, F, nullptr, n);
+    for (n = 0; first + n < count && is_in_group(group[n]); n++)
+      memcpy(states.data() + rows * n, group[n].state, bytes);
+    double *d = increments.data() + 3 * first, *F = tractions.data() + 3 * first;
+    for (int k = 0; is_still && k < n; k++) jlaw_traction(law, group[k].state, F + 3 * k);
+    const int done = is_still ? n : jlaw_update_many(law, states.data(), rows, d, F, nullptr, n);
     if (done < n) {
-      const Contact &c = steps[first + done].contact;
+      const Step &step = group[done];
       char message[JLAW_MESSAGE];
-      jlaw_update(law, of(done), of(done), d + 3 * done, F, nullptr, message, sizeof message);
-      error->one(FLERR, "pair_style jointlaw: atoms {} {} at step {}: {}", atom->tag[c.i],
-                 atom->tag[c.j], update->ntimestep, message);
+      jlaw_update(law, step.state, step.state, d + 3 * done, F, nullptr, message, sizeof message);
+      error->one(FLERR, "pair_style jointlaw: atoms {} {} at step {}: {}", atom->tag[step.i],
+                 atom->tag[step.j], update->ntimestep, message);
     }
-    for (size_t k = 0; k < n; k++) {
-      if (!is_still) memcpy(of(k), states.data() + rows * k, bytes);
-      apply_forces(steps[first + k], of(k), F + 3 * k);
-    }
+    for (int k = 0; !is_still && k < n; k++) memcpy(group[k].state, states.data() + rows * k, bytes);
   }
-  for (const Visit &v : visits) {    // open too far, without partner, or separated without force
+  apply_forces(count);
+  end_visits(count);
+}
+
+// After the first steps in the list: end joints of owners whose steps are complete, and keep the other steps
+void PairJointlaw::end_visits(int count)
+{
+  size_t complete = 0;
+  for (; complete < visits.size() && visits[complete].end_step <= count; complete++) {
+    const Visit &v = visits[complete];
     AtomJoints &own = joints_of->of[v.i];
-    for (int k = v.joint_count - 1; k >= 0; k--)
-      if (joint_flags[v.first_flag + k] != IN_CONTACT) end_joint(v.i, k, joint_flags[v.first_flag + k] == NOT_FOUND);
+    for (int k = v.joint_count - 1; k >= 0; k--) {    // open too far, without partner, or separated without force
+      const char flag = joint_flags[v.first_flag + k];
+      if (flag != IN_CONTACT) end_joint(v.i, k, flag == NOT_FOUND);
+    }
     joints_of->reserve_exchange(own.n);
   }
-  steps.clear();
-  visits.clear();
-  joint_flags.clear();
-  increments.clear();
+  visits.erase(visits.begin(), visits.begin() + complete);
+  steps.erase(steps.begin(), steps.begin() + count);
+  if (!steps.empty()) lanes[0] = lanes[count / LANES];    // count is a multiple of LANES
+  const int flags = visits.empty() ? static_cast<int>(joint_flags.size()) : visits[0].first_flag;
+  joint_flags.erase(joint_flags.begin(), joint_flags.begin() + flags);
+  for (Visit &v : visits) v.end_step -= count, v.first_flag -= flags;
+  for (Step &step : steps) step.flag -= step.flag < 0 ? 0 : flags;
 }
 
-// Add forces and torques of a joint after its step
-void PairJointlaw::apply_forces(const Step &step, double *state, const double *F)
+// Add forces and torques of the joints of the first steps in the list
+void PairJointlaw::apply_forces(int count)
 {
-  const Contact &c = step.contact;
-  const Vector &slide = step.slide, &axis2 = step.axis2, &axis3 = step.axis3;
+  for (int at = 0; at < count; at++) {
+    const Step &step = steps[at];
+    Lanes &o = lanes[at / LANES];
+    const int l = at % LANES;
+    const double *F = tractions.data() + 3 * at;
+    for (int k = 0; k < 3; k++) o.traction[k][l] = F[k];
+    const bool bears_no_force = F[0] == 0.0 && F[1] == 0.0 && F[2] == 0.0;
+    const bool is_separated = !planar && step.flag >= 0 && o.closure[l] < 0.0 && bears_no_force;
+    if (is_separated) joint_flags[step.flag] = SEPARATED;    // a virgin joint when they touch again
+    o.damping_force[l] = damping > 0.0 && !is_separated ? damping_force(step, o, l) : 0.0;
+    step.state[rows + DAMPING_FORCE] = o.damping_force[l];
+  }
+  for (int b = 0; b * LANES < count; b++) compute_forces(lanes[b]);
+  const bool tallies = eflag_either || evflag || !stiffness.empty();
+  for (int at = 0; at < count; at++) {
+    const Step &step = steps[at];
+    const Lanes &o = lanes[at / LANES];
+    const int l = at % LANES;
+    if (step.flag >= 0 && joint_flags[step.flag] == SEPARATED) continue;
+    double *fi = atom->f[step.i], *fj = atom->f[step.j];
+    double *ti = atom->torque[step.i], *tj = atom->torque[step.j];
+    for (int k = 0; k < 3; k++) {
+      fj[k] += o.force[k][l];
+      fi[k] -= o.force[k][l];
+      tj[k] += o.torque_j[k][l];
+      ti[k] -= o.torque_i[k][l];
+    }
+    if (tallies || step.flag < 0) tally(step, o, l);
+  }
+}
+
+// Damping force (N) of a joint after its step, and the energy that it dissipated in the step; also in a
+// setup, from the present velocities and keywords
+double PairJointlaw::damping_force(const Step &step, const Lanes &o, int l)
+{
+  const double mass_i = atom->rmass[step.i], mass_j = atom->rmass[step.j];
+  const double reduced = mass_i * mass_j / (mass_i + mass_j), opening_speed = dot(get(o.slide, l), get(o.n, l));
+  const double k = o.area[l] * step.law->normal_stiffness.at(o.traction[0][l]);
+  const double limit = o.area[l] * std::max(o.traction[0][l], 0.0);
+  const double force = std::max(-2.0 * damping * sqrt(k * reduced) * opening_speed, -limit);    // no tension
+  // this velocity is between the forces of the last step and of this one
+  const double mean_force = 0.5 * (step.state[rows + DAMPING_FORCE] + force);
+  joints_of->sums[FixJointlawMemory::DAMPING_DISSIPATION] -= mean_force * opening_speed * time_step();
+  return force;
+}
+
+// Sums over joints: energies, stiffness of atoms, virial. Always for a new joint.
+void PairJointlaw::tally(const Step &step, const Lanes &o, int l)
+{
   const jlaw_law *law = step.law->law;
-  const int i = c.i, j = c.j;
-  const bool fresh = step.flag < 0;
-  const double dt = update->setupflag ? 0.0 : update->dt;
-  double *extra = state + rows;
-  if (!planar && c.closure < 0.0 && F[0] == 0.0 && F[1] == 0.0 && F[2] == 0.0) {
-    joint_flags[step.flag] = SEPARATED;    // a virgin joint when they touch again
-    return;
-  }
-  double push = 0.0;    // also in a setup: from the present velocities and keywords
-  if (damping > 0.0) {
-    const double reduced = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
-    const double opening_speed = dot(slide, c.n), k = c.area * step.law->normal_stiffness.at(F[0]);
-    const double limit = c.area * std::max(F[0], 0.0);
-    push = std::max(-2.0 * damping * sqrt(k * reduced) * opening_speed, -limit);    // no tension
-    // this velocity is between the forces of the last step and of this one
-    const double mean_force = 0.5 * (extra[DAMPING_FORCE] + push);
-    joints_of->sums[FixJointlawMemory::DAMPING_DISSIPATION] -= mean_force * opening_speed * dt;
-  }
-  extra[DAMPING_FORCE] = push;
-  const Vector shear = sum(times(F[1], axis2), F[2], axis3);
-  const Vector g = sum(times(c.area * F[0] + push, c.n), -c.area, shear);    // on j
-  const Vector ti = cross(c.arm_i, g), tj = cross(c.arm_j, g);
-  for (int k = 0; k < 3; k++) {
-    atom->f[j][k] += g[k];
-    atom->f[i][k] -= g[k];
-    atom->torque[j][k] += tj[k];
-    atom->torque[i][k] -= ti[k];
-  }
+  const int i = step.i, j = step.j;
+  const double area = o.area[l], closure = o.closure[l];
   // a joint created between overlapping bodies adds its stored energy to the balance
-  const bool created_closed = fresh && c.closure + dt * dot(slide, c.n) > 0.0;
-  const double stored = eflag_either || created_closed ? c.area * jlaw_stored_energy(law, state) : 0.0;
+  const bool created_closed =
+      step.flag < 0 && closure + time_step() * dot(get(o.slide, l), get(o.n, l)) > 0.0;
+  const double stored = eflag_either || created_closed ? area * jlaw_stored_energy(law, step.state) : 0.0;
   if (created_closed) joints_of->sums[FixJointlawMemory::DELETED_ENERGY] -= stored;
   if (eflag_either) {
     pvector[0]++;
-    pvector[1] += c.area * jlaw_dissipated_energy(law, state);
+    pvector[1] += area * jlaw_dissipated_energy(law, step.state);
   }
   if (!stiffness.empty()) {    // of the unsheared joint at this closure, or of the present state
     const double zero[3] = {0.0, 0.0, 0.0};
     double same[3], as_is[9], squares = 0.0;
-    scratch.assign(state, state + rows);
-    jlaw_update(law, state, scratch.data(), zero, same, as_is, nullptr, 0);
+    scratch.assign(step.state, step.state + rows);
+    jlaw_update(law, step.state, scratch.data(), zero, same, as_is, nullptr, 0);
     for (const double x : as_is) squares += x * x;
-    const double k = jlaw_max_stiffness(law, std::max(c.closure, 0.0));
-    stiffness[i] += c.area * std::max(k, sqrt(squares));
-    stiffness[j] += c.area * std::max(k, sqrt(squares));
+    const double k = area * std::max(jlaw_max_stiffness(law, std::max(closure, 0.0)), sqrt(squares));
+    stiffness[i] += k;
+    stiffness[j] += k;
   }
-  if (evflag)
-    ev_tally_xyz(i, j, atom->nlocal, 1, stored, 0.0, -g[0], -g[1], -g[2],
-                 c.arm_j[0] - c.arm_i[0], c.arm_j[1] - c.arm_i[1], c.arm_j[2] - c.arm_i[2]);
+  if (evflag) {
+    const Vector g = get(o.force, l), between = sum(get(o.arm_j, l), -1.0, get(o.arm_i, l));
+    ev_tally_xyz(i, j, atom->nlocal, 1, stored, 0.0, -g[0], -g[1], -g[2], between[0], between[1], between[2]);
+  }
 }
 
 // Delete a joint of atom i; with deleted_under_load its stored energy is booked

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse import csc_array, csr_array, vstack
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu, spsolve
+from scipy.sparse.linalg import SuperLU, splu
 
 from .bolts import StaticBolts
 from .relaxation import UNSTABLE_FRACTION, Relaxation, Verdict
@@ -40,7 +40,9 @@ DAMPING_DECREASE = 10.0
 MIN_DAMPING = 1e-3  # of the largest stiffness
 REGULARISATION = 1e-9  # of the least damping, so that free blocks give no singular matrix
 
-ORDERING = "MMD_AT_PLUS_A"  # of the unknowns, for a structure that is symmetric
+# Sparse factorisation: the structure is symmetric, the entries are not
+ORDERING = "MMD_AT_PLUS_A"  # of the unknowns, by minimum degree
+PIVOT_THRESHOLD = 0.01  # of the largest entry of a column: a larger diagonal entry is the pivot
 
 # Relaxation
 RELEASE_CLOSURES = 10.0  # largest closures by which an unstable block may move from its place
@@ -152,6 +154,19 @@ class StiffnessPattern:
         copy = csc_array((entries, self.rows.copy(), self.starts.copy()), shape=matrix.shape)
         copy.eliminate_zeros()
         return copy
+
+
+def factorise(matrix: csc_array) -> SuperLU | None:
+    """Factorise a stiffness matrix (m, m) with a symmetric structure; None if it is singular.
+
+    Pivots stay on the diagonal unless they are much smaller than the rest of their column. Choosing
+    the largest entry instead would undo the ordering, and fill in several times as many entries.
+    """
+    options = {"SymmetricMode": True}
+    try:
+        return splu(matrix, ORDERING, diag_pivot_thresh=PIVOT_THRESHOLD, options=options)
+    except RuntimeError:
+        return None
 
 
 class Solution(NamedTuple):
@@ -304,11 +319,8 @@ class EquilibriumSearch:
         unbalanced, stiffness = self._unbalanced(y[is_free])
         diagonal = drag[is_free] + FIXING_DRAG * is_fixed
         matrix = self.pattern.with_diagonal(self._assemble_stiffness(stiffness), diagonal)
-        try:
-            factors = splu(matrix, permc_spec=ORDERING)
-        except RuntimeError:
-            return None
-        return self.expand(factors.solve(unbalanced * ~is_fixed))
+        factors = factorise(matrix)
+        return None if factors is None else self.expand(factors.solve(unbalanced * ~is_fixed))
 
     def _distance(self, displacement: np.ndarray) -> np.ndarray:
         """Largest displacement (n,) in m of each block at scaled displacements (n, dof)."""
@@ -454,7 +466,8 @@ class EquilibriumSearch:
             step = self.zero
             for _ in range(MAX_DAMPINGS):
                 diagonal = drag + damping[island] + REGULARISATION * min_damping
-                solution = spsolve(self.pattern.with_diagonal(K, diagonal), residual, ORDERING)
+                factors = factorise(self.pattern.with_diagonal(K, diagonal))
+                solution = np.nan * residual if factors is None else factors.solve(residual)
                 step = np.where(needs_damping[island], solution, step)
                 trial = evaluate(y + step * is_active[island])
                 needs_damping = is_active & ~(trial[-1] < size)

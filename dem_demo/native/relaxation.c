@@ -67,14 +67,14 @@ INLINE void resist_by_friction(const dem_relaxation *p, const dem_relaxed_law *l
     const double *ya = y + dof * block_a[i], *yb = y + dof * block_b[i];
     double *ra = force + dof * block_a[i], *rb = force + dof * block_b[i];
     double F[3], size = 0.0;
-    for (int c = 0; c < dim; c++) {
-      F[c] = start[i * dim + c];
-      for (int m = 0; m < dof; m++)
-        F[c] += row[2 * dof * c + m] * ya[m] + row[2 * dof * c + dof + m] * yb[m];
-    }
+    F[0] = start[i * dim];
+    for (int m = 0; m < dof; m++) F[0] += row[m] * ya[m] + row[dof + m] * yb[m];
     if (F[0] <= 0.0) continue; /* not for NaN, which shows that iterations diverge */
     F[0] *= normal_stiffness;
     for (int c = 1; c < dim; c++) {
+      F[c] = start[i * dim + c];
+      for (int m = 0; m < dof; m++)
+        F[c] += row[2 * dof * c + m] * ya[m] + row[2 * dof * c + dof + m] * yb[m];
       F[c] *= shear_stiffness;
       size += F[c] * F[c];
     }

@@ -15,12 +15,11 @@ equilibrium that was found is the proof on that side.
 
 import itertools
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import OptimizeResult, linprog
-from scipy.sparse import csr_array, diags, eye, hstack, vstack
+from scipy.sparse import csr_array, diags, hstack
 
 import jointlaw as jl
 from jointlaw.joints.normal_control import NormalCondition, closing_increments
@@ -30,6 +29,7 @@ from ..dynamics.blocks import Blocks, apply_loads
 from ..dynamics.timestep import closure_and_shear_rates
 from ..output.monitors import slip_distance
 from ..scene import Scene
+from .interior_point import Lines, minimise_imbalance
 
 SMALLEST_FACTOR = 1 / 64
 LARGEST_FACTOR = 64.0
@@ -40,7 +40,9 @@ SHEAR_STEPS = 120  # of a test up to the peak of a bond, and to the end of the t
 STRESS_RANGE = 1e-3, 3.0  # of the largest overburden stress: where they lie
 SLOPE_STEP = 1.05  # ratio of the two stresses that give a tangent
 BALANCED = 1e-6  # unbalanced forces over the largest load that are rounding of the solver
-STRENGTH_CHANGE = 1e-3  # relative: change of strength whose effect on a program is computed
+OPTIMALITY_GAP = 1e-3  # of the least unbalanced forces: how far the lower bound lies below them
+UNLIMITED_SHEAR = 1e6  # largest loads: shear strength of joints that never slide
+MIN_SHEAR_STRENGTH = 1e-9  # largest loads: of joints without friction and cohesion
 FIRST_RATIO = 2.0  # of factors that are tried until the blocks cannot balance
 MAX_NEWTON_TRIALS = 12  # then the search bisects
 
@@ -184,140 +186,115 @@ class Imbalance(NamedTuple):
     derivative: float
 
 
-class Program(NamedTuple):
-    """A linear program: minimise the sum of unbalanced forces.
-
-    equations (m, n), right_side (m,): balance of the m free motions. rows, limits: inequalities of
-    further lines of strengths, None without any. bounds (n, 2): of the unknowns. cost (n,).
-    """
-
-    equations: csr_array
-    right_side: np.ndarray
-    rows: csr_array | None
-    limits: np.ndarray | None
-    bounds: np.ndarray
-    cost: np.ndarray
-
-
 def least_imbalance(balance: ForceBalance, factor: float) -> Imbalance:
     """Least unbalanced forces of all blocks with the strength divided by factor.
 
-    They are zero (`BALANCED`) if there are contact forces that balance all blocks. The derivative
-    follows from the multipliers of the linear program, which do not change to first order. Raises
-    RuntimeError where the solver finds no solution.
+    They are zero (`BALANCED`) if there are contact forces that balance all blocks; else they are a
+    lower bound, at most a share `OPTIMALITY_GAP` too low. The derivative follows from the
+    multipliers of the linear program, which do not change to first order. Raises RuntimeError where
+    the solver finds no solution.
     """
-    if not np.abs(balance.load).max(initial=0.0):
+    scale = np.abs(balance.load).max(initial=0.0)
+    if not scale:
         return Imbalance(0.0, 0.0)
-    program = _program(balance, factor)
-    for method in ("highs-ipm", "highs-ds"):
-        solution = linprog(
-            program.cost, A_ub=program.rows, b_ub=program.limits, A_eq=program.equations,
-            b_eq=program.right_side, bounds=program.bounds, method=method,
-        )  # fmt: skip
-        if solution.status == 0:
-            break
-    else:
-        raise RuntimeError(f"limit analysis at a factor of {factor:.4g}: {solution.message}")
-    stronger = _program(balance, factor / (1.0 + STRENGTH_CHANGE))
-    change = _change_of_minimum(program, stronger, solution)
-    return Imbalance(solution.fun, change * factor / STRENGTH_CHANGE)
+    lines = _lines(balance, factor, scale)
+    slope = _base_slope(balance, factor)
+    no_shear = csr_array(balance.bolts.shape)
+    normal = hstack([balance.normal, balance.bolts]).tocsr()
+    shear = hstack([balance.shear, no_shear]).tocsr()
+    # N = p + q and S = slope (p - q); N = p and S = q without a slope
+    has_slope = slope > 0.0
+    first = normal + shear @ diags(slope)
+    second = normal @ diags(has_slope * 1.0) + shear @ diags(np.where(has_slope, -slope, 1.0))
+    rows = Lines(
+        lines.contact,
+        lines.normal + lines.shear * slope[lines.contact],
+        np.where(
+            has_slope[lines.contact],
+            lines.normal - lines.shear * slope[lines.contact],
+            lines.shear,
+        ),
+        lines.limit,
+    )
+    load = -balance.load / scale
+    solution = minimise_imbalance(first, second, load, rows, BALANCED, OPTIMALITY_GAP)
+    if solution is None:
+        raise RuntimeError(f"limit analysis at a factor of {factor:.4g}: no solution found")
+    if solution.imbalance <= BALANCED:
+        return Imbalance(0.0, 0.0)
+    n = len(slope)
+    p = solution.force[:n]
+    q = solution.force[n:]
+    normal_force = np.where(has_slope, p + q, p)[lines.contact]
+    strength = lines.strength_at_zero + lines.strength_by_normal * normal_force
+    return Imbalance(solution.lower_bound, -float(solution.multiplier @ strength))
 
 
-def _change_of_minimum(program: Program, changed: Program, solution: OptimizeResult) -> float:
-    """Change of the minimum of a linear program, to first order in the change of the program."""
-    x = solution.x
-    residual = (changed.right_side - program.right_side) - (
-        changed.equations - program.equations
-    ) @ x
-    change = solution.eqlin.marginals @ residual
-    if program.rows is not None:
-        slack = (changed.limits - program.limits) - (changed.rows - program.rows) @ x
-        change += solution.ineqlin.marginals @ slack
-    for column, side in enumerate((solution.lower, solution.upper)):
-        is_finite = np.isfinite(program.bounds[:, column])
-        moved = changed.bounds[is_finite, column] - program.bounds[is_finite, column]
-        change += side.marginals[is_finite] @ moved
-    return float(change)
+class StrengthLines(NamedTuple):
+    """Lines `normal` N + `shear` S <= limit of the strength divided by a factor, of contacts and,
+    after them, of bolts; N and S relative to the largest load.
 
-
-def _program(balance: ForceBalance, factor: float) -> Program:
-    """The linear program for the strength divided by factor.
-
-    Unknowns of each contact: the normal force above -tension, N + T = p + q with p, q >= 0, and the
-    shear force (mu/F) (p - q) + s with |s| bounded by the rest of the cohesion. They respect the
-    steepest line of its strength by themselves; further lines are inequalities. The tension of a
-    bolt is between zero and its capacity, which is not divided. Unknowns of each motion: unbalanced
-    force in either direction. Forces are relative to the largest load.
+    The limit less `normal` N contains the strength `strength_at_zero` + `strength_by_normal` N
+    times the inverse of the factor.
     """
-    scale = np.abs(balance.load).max()
-    area = balance.area / scale
-    law = balance.law
-    first = [strength.friction.argmax() for strength in balance.strengths]
-    pairs = list(zip(balance.strengths, first, strict=True))
-    slope = np.array([strength.friction[i] for strength, i in pairs])[law] / factor
-    free = np.isinf(slope)  # such a joint never slides
-    slope = np.where(free, 0.0, slope)
-    cohesion = np.array([strength.cohesion[i] for strength, i in pairs])[law] * area / factor
-    tension = np.array([strength.tension for strength in balance.strengths])[law] * area / factor
-    rest = np.where(free, np.inf, np.maximum(cohesion - slope * tension, 0.0))
-    count = len(area)
-    motions = len(balance.load)
-    cohesive = np.flatnonzero(rest > 0)
-    sliding = balance.shear @ diags(slope)
-    unbalanced = eye(motions, format="csr")
-    equations = hstack(
-        [
-            balance.normal + sliding,
-            balance.normal - sliding,
-            balance.shear[:, cohesive],
-            balance.bolts,
-            unbalanced,
-            -unbalanced,
-        ]
-    ).tocsr()
-    right_side = -balance.load / scale + balance.normal @ tension
-    unknowns = equations.shape[1]
-    bounds = np.zeros((unknowns, 2))
-    bounds[:, 1] = np.inf
-    first_bolt = 2 * count + len(cohesive)
-    first_unbalanced = unknowns - 2 * motions
-    bounds[2 * count : first_bolt] = np.stack([-rest[cohesive], rest[cohesive]], axis=1)
-    bounds[first_bolt:first_unbalanced, 1] = balance.capacity / scale
-    cost = np.zeros(unknowns)
-    cost[first_unbalanced:] = 1.0
-    rows, limits = _further_lines(balance, first, factor, area, slope, tension, cohesive, unknowns)
-    return Program(equations, right_side, rows, limits, bounds, cost)
+
+    contact: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    limit: np.ndarray
+    strength_at_zero: np.ndarray
+    strength_by_normal: np.ndarray
 
 
-def _further_lines(balance, first, factor, area, slope, tension, cohesive, unknowns):
-    """Rows and bounds of |S| <= (c + mu N)/F for all lines but the first of each contact."""
-    count = len(area)
-    place = np.full(count, -1)
-    place[cohesive] = 2 * count + np.arange(len(cohesive))
-    rows = []
-    limits = []
+def _lines(balance: ForceBalance, factor: float, scale: float) -> StrengthLines:
+    """The lines of all contacts: |S| <= (c + mu N)/F and -N <= T/F. The tension of a bolt is
+    between zero and its capacity, which is not divided."""
+    parts: list[StrengthLines] = []
+
+    def add(
+        contact: np.ndarray, normal: float, shear: float, limit: Any, at_zero: Any, by_normal: float
+    ) -> None:
+        one = np.ones(len(contact))
+        values = (normal, shear, limit, at_zero, by_normal)
+        parts.append(StrengthLines(contact, *(one * value for value in values)))
+
     for number, strength in enumerate(balance.strengths):
-        contacts = np.flatnonzero(balance.law == number)
-        for line in range(len(strength.friction)):
-            if line == first[number] or not len(contacts):
-                continue
-            k = np.arange(len(contacts))
-            mu = strength.friction[line] / factor
-            bound = strength.cohesion[line] * area[contacts] / factor - mu * tension[contacts]
-            has_rest = place[contacts] >= 0
+        contact = np.flatnonzero(balance.law == number)
+        area = balance.area[contact] / scale
+        for cohesion, friction in zip(strength.cohesion, strength.friction, strict=True):
             for sign in (1.0, -1.0):
-                entries = [
-                    (k, contacts, sign * slope[contacts] - mu),
-                    (k, count + contacts, -sign * slope[contacts] - mu),
-                    (k[has_rest], place[contacts[has_rest]], np.full(has_rest.sum(), sign)),
-                ]
-                row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
-                shape = (len(contacts), unknowns)
-                rows.append(csr_array((value, (row, column)), shape=shape))
-                limits.append(bound)
-    if not rows:
-        return None, None
-    return vstack(rows).tocsr(), np.concatenate(limits)
+                if np.isinf(friction):  # such a joint never slides
+                    add(contact, 0.0, sign, UNLIMITED_SHEAR, 0.0, 0.0)
+                    continue
+                at_zero = cohesion * area
+                limit = at_zero / factor
+                if friction == 0.0:
+                    limit = np.maximum(limit, MIN_SHEAR_STRENGTH)
+                add(contact, -friction / factor, sign, limit, at_zero, friction)
+        is_sloped = (strength.friction > 0.0) & np.isfinite(strength.friction)
+        bounds_tension = is_sloped & (strength.cohesion <= strength.friction * strength.tension)
+        if not bounds_tension.any():
+            at_zero = strength.tension * area
+            add(contact, -1.0, 0.0, at_zero / factor, at_zero, 0.0)
+    bolt = len(balance.area) + np.arange(len(balance.capacity))
+    capacity = balance.capacity / scale
+    is_limited = np.isfinite(capacity)
+    add(bolt, -1.0, 0.0, 0.0, 0.0, 0.0)
+    add(bolt[is_limited], 1.0, 0.0, capacity[is_limited], 0.0, 0.0)
+    for sign in (1.0, -1.0):
+        add(bolt, 0.0, sign, 1.0, 0.0, 0.0)  # a bolt has no shear force: any bound will do
+    return StrengthLines(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _base_slope(balance: ForceBalance, factor: float) -> np.ndarray:
+    """Slope of the steepest line of each contact with the strength divided by factor, zero of
+    bolts and of joints that never slide.
+
+    Forces along both lines of this slope leave no difference of large numbers to the solver.
+    """
+    steepest = np.array([strength.friction.max() for strength in balance.strengths])
+    steepest[np.isinf(steepest)] = 0.0
+    return np.append(steepest[balance.law] / factor, np.zeros(len(balance.capacity)))
 
 
 def format_bound(bound: float | None) -> str:

@@ -6,10 +6,18 @@ import math
 import numpy as np
 import pytest
 from scene_text import ROCK, block, coulomb, lines, on_base
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, eye, hstack, vstack
 
 import jointlaw as jl
 from dem_demo import parse
-from dem_demo.studies.limit_analysis import limit_factor, peak_strength, strength_of
+from dem_demo.studies.limit_analysis import (
+    force_balance,
+    least_imbalance,
+    limit_factor,
+    peak_strength,
+    strength_of,
+)
 
 EXACT = 1.5e-3  # more than the search leaves, 1e-3
 UNIT_WEIGHT = 2600.0 * 9.81
@@ -122,3 +130,89 @@ def test_block_on_a_rough_joint():
     arm = height * shear / (3.0 * normal)  # two points, 3 m apart, balance the moment of the weight
     by_hand = uneven(arm) / (2 * shear)
     assert limit_factor(scene) == pytest.approx(by_hand, rel=0.01)
+
+
+TOP = 'gravity = [0.0, -9.81]\nlaw = "joint"\n[laws.joint]\n'
+SLOPE = """
+[[rock]]
+name = "slope"
+outline = [[-12, -1], [5, -1], [5, 0], [0, 0], [-5, 8], [-12, 8]]
+seed = 1
+[[rock.set]]
+dip = 30.0
+spacing = 1.5
+through = [-0.2, 0.6]
+[[rock.set]]
+dip = -60.0
+spacing = 2.0
+[[rock.fixed]]
+corners = [[-16, -2], [6, -2], [6, 0.1], [0.2, 0.2], [-9.6, 5.7], [-11, 7.5], [-11, 9], [-16, 9]]
+[run]
+end = 1.0
+"""
+BOLT = "[[bolt]]\n" + lines(
+    **{"from": [-2.6, 3.0], "to": [-11.5, -0.7]},
+    stiffness=1e8,
+    capacity=1e5,
+    pretension=0.0,
+)
+LAWS = {
+    "friction": coulomb(0.7),
+    "cohesion and tension": coulomb(0.5, cohesion=2e3, tension=5e2),
+    "no friction": coulomb(0.0, cohesion=1e4),
+    "no strength": coulomb(0.0),
+    "strong bonds": coulomb(1.0, 1e12, 1e12, cohesion=1e11, tension=1e10),
+    "rough": ROCK,
+}
+
+
+def solve_by_linprog(balance, factor):
+    """Least unbalanced forces by a general solver, from the balance and the lines as they are."""
+    scale = np.abs(balance.load).max()
+    m, n = balance.normal.shape
+    area = balance.area / scale
+    bolts = balance.bolts.shape[1]
+    one = eye(m)
+    equations = hstack([balance.normal, balance.shear, balance.bolts, one, -one])
+    bounds = [(None, None)] * (2 * n)
+    rows = []
+    limits = []
+    for i, strength in enumerate(balance.strengths):
+        k = np.flatnonzero(balance.law == i)
+        pick = csr_array((np.ones(len(k)), (np.arange(len(k)), k)), shape=(len(k), n))
+        rest = csr_array((len(k), bolts + 2 * m))
+        for cohesion, friction in zip(strength.cohesion, strength.friction, strict=True):
+            for sign in (1.0, -1.0):
+                rows.append(hstack([-friction / factor * pick, sign * pick, rest]))
+                limits.append(cohesion * area[k] / factor)
+        rows.append(hstack([-pick, 0.0 * pick, rest]))
+        limits.append(strength.tension * area[k] / factor)
+    bounds += [(0.0, capacity / scale) for capacity in balance.capacity]
+    bounds += [(0.0, None)] * (2 * m)
+    cost = np.repeat([0.0, 1.0], [2 * n + bolts, 2 * m])
+    solution = linprog(
+        cost, vstack(rows), np.concatenate(limits), equations, -balance.load / scale, bounds
+    )
+    assert solution.status == 0
+    return solution.fun
+
+
+QUICK_LAWS = ("cohesion and tension", "no strength")
+SLOW_LAWS = [pytest.param(law, marks=pytest.mark.slow) for law in LAWS if law not in QUICK_LAWS]
+
+
+@pytest.mark.parametrize("law", [*QUICK_LAWS, *SLOW_LAWS])
+def test_the_interior_point_method_finds_the_minimum_of_a_general_solver(law):
+    """Least unbalanced forces of a cut slope with a bolt, below and above its limit, and their
+    derivative by the inverse of the factor."""
+    balance = force_balance(parse(TOP + LAWS[law] + SLOPE + BOLT))
+    for factor in (0.7, 3.0):
+        imbalance = least_imbalance(balance, factor)
+        by_linprog = solve_by_linprog(balance, factor)
+        # the lower bound lies below the minimum by a share of 1e-3 at most
+        assert imbalance.force == pytest.approx(by_linprog, rel=1.1e-3, abs=1e-6)
+        assert imbalance.force <= by_linprog * (1.0 + 1e-6) + 1e-6
+        if by_linprog > 0.01:  # above its limit
+            weaker, stronger = (solve_by_linprog(balance, factor * s) for s in (1.001, 0.999))
+            slope = (stronger - weaker) * factor / 2e-3
+            assert imbalance.derivative == pytest.approx(slope, rel=0.02, abs=1e-3)

@@ -113,9 +113,7 @@ class _Contacts(NamedTuple):
 class _Method:
     """The arrays of a program, see `minimise_imbalance`."""
 
-    def __init__(
-        self, first: csr_array, second: csr_array, load: np.ndarray, lines: Lines
-    ) -> None:
+    def __init__(self, first: csr_array, second: csr_array, load: np.ndarray, lines: Lines) -> None:
         self.m, self.n = first.shape
         self.first = first
         self.second = second

@@ -25,6 +25,7 @@ from ..dynamics.simulation import (
     find_state,
     read_arrays,
 )
+from ..dynamics.timestep import MAX_FRACTION_OF_LIMIT
 from ..scene import read_tables
 from ..scene.read import is_in_space
 from .blocks import SpaceBlocks, apply_loads, impact_limit
@@ -34,6 +35,8 @@ from .read import parse
 from .scene import SpaceScene
 
 MIN_POINTS_FOR_THREADS = 2000  # with fewer a second thread costs more than it saves
+NOT_CHECKED = -1.0  # N/m: the step is checked in any case, as every stiffness is larger
+MAX_LANDING_FRACTION = 0.1  # of the limit: longest step in which blocks land, see docs/space.md
 OF_BOLTS = "blocks.bolts."  # paths of the state that only the plane has
 
 
@@ -149,7 +152,36 @@ class SpaceSimulation(Simulation):
         old_row = manager.rebuild(blocks.motion, blocks.neighbour_pairs(), keep_closure=False)
         limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[old_row]
         self.joints.rearrange(old_row, manager.law, manager.face_pairs, started=True)
+        if self.halvings_left:
+            self._mark_landings()
         return old_row < 0
+
+    def _mark_landings(self) -> None:
+        """Have the time step checked at the end of this step if blocks are about to land.
+
+        Contacts that are still open, and will be stiffer than the time step has been checked for:
+        new ones, or wider ones, as where a face comes down on which only an edge has stood.
+        """
+        contacts = self.contacts
+        closure = np.maximum(contacts.closure, 0.0)
+        stiffness = contacts.area * self.joints.interpolate("stiffness", "closure", closure)
+        checked = self.limit.checked_stiffness
+        checked[(contacts.closure < 0) & (stiffness > checked)] = NOT_CHECKED
+
+    def _check_time_step(self) -> None:
+        """Halve the time step for landings, beyond what stability needs.
+
+        A contact opens or closes within a step, but its force acts from the step in which it is
+        closed to the one in which it is open. Of the energy of an impact this gains or loses up to
+        (omega dt)^2/4, with the frequency omega of the block on the contact.
+        """
+        if self.halvings_left and (self.limit.checked_stiffness == NOT_CHECKED).any():
+            longest = self.dt * MAX_FRACTION_OF_LIMIT / MAX_LANDING_FRACTION  # needs a bound there
+            limit = self.limit
+            limit.update(self.scene, self.blocks, self.contacts, self.joints, longest)
+            while self.dt > MAX_LANDING_FRACTION * limit.current and self._halve_time_step():
+                pass
+        super()._check_time_step()
 
     def _continue_across_seams(self, is_new: np.ndarray) -> None:
         """Let new points on a coplanar block continue the joints across the seam."""

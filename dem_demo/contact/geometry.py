@@ -156,7 +156,7 @@ class Contacts(ContactRows):
         """
         first_is_flatter = self.tilt_sine[0] < self.tilt_sine[1] - PARALLEL_SINE
         side = np.where(first_is_flatter, self.outlines.previous[self.corner], self.corner)
-        return np.sort([side, self.edge], axis=0).T
+        return np.column_stack([np.minimum(side, self.edge), np.maximum(side, self.edge)])
 
     def next_codes(self) -> np.ndarray:
         """Codes (k,) of the contacts that come next at the nearer limits of the ranges."""

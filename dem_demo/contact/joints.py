@@ -217,7 +217,13 @@ class Joints:
     def __init__(self, scene: Scene) -> None:
         self.law_names = [*scene.laws]
         self.by_law = [LawJoints(law, scene.reduction) for law in scene.laws.values()]
-        self.dim = self.by_law[0].dim
+        self.dim = len(scene.gravity)
+        for name, law in scene.laws.items():
+            if law.dim != self.dim:
+                raise ValueError(
+                    f"law {name!r} has displacements of {law.dim} components, and the scene has "
+                    f"{self.dim}: make it with plane={0.0 if self.dim == 2 else None}"
+                )
         self.reduction = np.array([1.0, *[scene.reduction] * (self.dim - 1)])
         self.tensile_stiffness = np.array([law.tensile_stiffness for law in scene.laws.values()])
         self.first_touch = np.zeros((0, self.dim))
@@ -390,20 +396,32 @@ class Joints:
         self.step_arrays.call("read_joints")
         return out
 
-    def continue_joints(self, rows: np.ndarray, sources: np.ndarray) -> None:
+    def continue_joints(self, rows: np.ndarray, sources: np.ndarray) -> bool:
         """Let the joints of contacts `rows` (m,) continue the joints of contacts `sources` (m,).
 
-        They become copies with the same law and history.
+        They become copies with the same law and history. No contact is among both.
+
+        Returns whether arrays were made anew, which must be bound again: where a law changes.
         """
-        for row, source in zip(rows.tolist(), sources.tolist(), strict=True):
-            joints = self.by_law[self.law[source]]
-            if self.law[row] != self.law[source]:
-                self.by_law[self.law[row]].release(self.place[[row]])
-                self.law[row] = self.law[source]
-                self.place[row] = joints.allocate(1)[0]
-            joints.copy(self.place[[source]], self.place[[row]])
-            self.first_touch[row] = self.first_touch[source]
-        self._arrange(self.law, self.place)
+        law = self.law[sources]
+        changed = np.flatnonzero(self.law[rows] != law)
+        for row, new_law in zip(rows[changed].tolist(), law[changed].tolist(), strict=True):
+            self.by_law[self.law[row]].release(self.place[[row]])
+            self.law[row] = new_law
+            self.place[row] = self.by_law[new_law].allocate(1)[0]
+        for i, joints in enumerate(self.by_law):
+            remaining = np.flatnonzero(law == i)
+            while len(remaining):  # a snapshot holds each source once
+                _, first = np.unique(sources[remaining], return_index=True)
+                copied = remaining[first]
+                joints.copy(self.place[sources[copied]], self.place[rows[copied]])
+                remaining = np.delete(remaining, first)
+        self.first_touch[rows] = self.first_touch[sources]
+        if len(changed):
+            self._arrange(self.law, self.place)
+        else:
+            self.step_arrays.call("read_joints")
+        return len(changed) > 0
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """A copy of all state, by names of arrays. Laws are numbered in them."""

@@ -193,43 +193,49 @@ class ContactManager:
         """
         contacts = self.contacts
         edge_pairs = contacts.edge_pairs
-        loaded = np.flatnonzero(bears_load)
-        law = self.laws_of(edge_pairs[rows])
+        own_edges = edge_pairs[rows].ravel()  # the shared edge of each candidate is one of them
+        is_own_edge = np.zeros(len(self.outlines.block), bool)
+        is_own_edge[own_edges] = True
+        loaded = np.flatnonzero(bears_load & is_own_edge[edge_pairs].any(axis=1))
+        loaded_edges = edge_pairs[loaded].ravel()
+        order = np.argsort(loaded_edges, kind="stable")
+        first, last = (
+            np.searchsorted(loaded_edges[order], own_edges, side) for side in ("left", "right")
+        )
+        count = last - first
+        which = np.repeat(np.arange(len(own_edges)), count)
+        place = order[np.arange(len(which)) - np.repeat(np.cumsum(count) - count - first, count)]
+        candidate = loaded[place // 2]
+        row = rows[which // 2]
+        across_seam = edge_pairs[candidate, 1 - place % 2]
+        other = edge_pairs[row, 1 - which % 2]
+        max_step = MAX_SEAM_STEP * self._skin(contacts.block_a[row], contacts.block_b[row])
+        is_as_deep = np.abs(contacts.closure[candidate] - contacts.closure[row]) <= max_step
+        has_law = self.law[candidate] == self.laws_of(edge_pairs[rows])[which // 2]
+        found = np.flatnonzero(is_as_deep & has_law & self._are_coplanar(across_seam, other))
+        distance = np.abs(contacts.position[candidate[found]] - contacts.position[row[found]])
+        found = found[np.lexsort([candidate[found], distance])]
         neighbours = np.full(len(rows), -1)
-        for i, row in enumerate(rows):
-            max_step = MAX_SEAM_STEP * self._skin(contacts.block_a[row], contacts.block_b[row])
-            is_as_deep = np.abs(contacts.closure[loaded] - contacts.closure[row]) <= max_step
-            candidates = loaded[is_as_deep & (self.law[loaded] == law[i])]
-            is_neighbour = np.zeros(len(candidates), bool)
-            for shared, other in (edge_pairs[row], edge_pairs[row, ::-1]):
-                has_shared = (edge_pairs[candidates] == shared).any(axis=1)
-                across_seam = edge_pairs[candidates].sum(axis=1) - shared
-                across_seam = np.where(has_shared, across_seam, other)
-                is_neighbour |= has_shared & self._are_coplanar(across_seam, other)
-            candidates = candidates[is_neighbour]
-            if len(candidates):
-                distance = np.abs(contacts.position[candidates] - contacts.position[row])
-                neighbours[i] = candidates[distance.argmin()]
+        neighbours[which[found[::-1]] // 2] = candidate[found[::-1]]  # the nearest is written last
         return neighbours
 
-    def _are_coplanar(self, edges: np.ndarray, other: int) -> np.ndarray:
-        """Whether edges (m,) of other blocks continue the edge `other` across a seam.
+    def _are_coplanar(self, edges: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Whether edges (m,) of other blocks continue the edges `others` (m,) across seams.
 
         They are parallel within 2 degrees. At the seam they end within a skin of each other, and
         within `MAX_SEAM_STEP` of a skin across their direction.
         """
         outlines = self.outlines
         start = outlines.corner_position
-        end = start[outlines.next]
-        direction = outlines.edge_direction[other]
-        skin = self.skins[outlines.block[other]]
-        angle = outlines.edge_direction[edges] * direction.conj()
-        to_next = (start[edges] - end[other]) * direction.conj()
-        to_previous = (end[edges] - start[other]) * direction.conj()
+        reverse = outlines.edge_direction[others].conj()
+        skin = self.skins[outlines.block[others]]
+        angle = outlines.edge_direction[edges] * reverse
+        to_next = (start[edges] - start[outlines.next[others]]) * reverse
+        to_previous = (start[outlines.next[edges]] - start[others]) * reverse
         seam = np.where(np.abs(to_next) < np.abs(to_previous), to_next, to_previous)
         is_parallel = (angle.real > 0) & (np.abs(angle.imag) <= MAX_SEAM_SINE)
         is_near = (np.abs(seam) <= skin) & (np.abs(seam.imag) <= MAX_SEAM_STEP * skin)
-        return is_parallel & is_near & (outlines.block[edges] != outlines.block[other])
+        return is_parallel & is_near & (outlines.block[edges] != outlines.block[others])
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""

@@ -573,8 +573,10 @@ class Simulation:
         edge_pairs = self.contacts.edge_pairs
         has_other_edges = (edge_pairs != manager.face_pairs).any(axis=1)
         stored_energy = joints.stored_energy
-        is_idle = (stored_energy == 0) & (joints.traction == 0).all(axis=1)
-        rows = np.flatnonzero(is_idle & (is_new | has_other_edges))
+        rows = np.flatnonzero((stored_energy == 0) & (is_new | has_other_edges))
+        rows = rows[(joints.traction[rows] == 0).all(axis=1)]
+        if not len(rows):
+            return
         sources = manager.find_neighbours(rows, stored_energy > 0)
         rows, sources = rows[sources >= 0], sources[sources >= 0]
         if not len(rows):
@@ -582,10 +584,11 @@ class Simulation:
         manager.face_pairs[rows] = edge_pairs[rows]
         manager.law[rows] = manager.law[sources]
         manager.closure_offset[rows] = manager.closure_offset[sources]
-        joints.continue_joints(rows, sources)
+        has_new_arrays = joints.continue_joints(rows, sources)
         balance = self.energy_balance
         balance.booked_dissipation[rows] = balance.booked_dissipation[sources]
-        self.bind()
+        if has_new_arrays:
+            self.bind()
         # laws have water pressures
         balance.change_loads(self.blocks, self._apply_loads(), self.dt)
 

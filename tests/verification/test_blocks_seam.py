@@ -229,3 +229,65 @@ def test_a_run_resumed_before_the_seam_is_the_same_bit_by_bit():
     actual = resumed.state()
     assert all(np.array_equal(expected[name], actual[name]) for name in expected)
     assert np.abs(sim.joints.delta[:, 1]).min() > 0.02  # all joints have crossed
+
+
+def neighbours_one_by_one(manager, rows, bears_load):
+    """Neighbours (m,) of contacts as `find_neighbours` defines them, by a loop over all pairs."""
+    contacts = manager.contacts
+    outlines = manager.outlines
+    corner = outlines.corner_position
+    found = []
+    for row in rows:
+        law = manager.laws_of(contacts.edge_pairs[[row]])[0]
+        a, b = contacts.block_a[row], contacts.block_b[row]
+        max_step = 0.05 * 0.5 * (manager.skins[a] + manager.skins[b])
+        best = (np.inf, -1)
+        for other in np.flatnonzero(bears_load & (manager.law == law)):
+            if abs(contacts.closure[other] - contacts.closure[row]) > max_step:
+                continue
+            for mine in (0, 1):
+                for its in (0, 1):
+                    shared, across = contacts.edge_pairs[other, [its, 1 - its]]
+                    edge = contacts.edge_pairs[row, 1 - mine]
+                    if shared != contacts.edge_pairs[row, mine]:
+                        continue
+                    if outlines.block[across] == outlines.block[edge]:
+                        continue
+                    along = outlines.edge_direction[edge].conj()
+                    gaps = [(corner[across] - corner[outlines.next[edge]]) * along,
+                            (corner[outlines.next[across]] - corner[edge]) * along]  # fmt: skip
+                    gap = min(gaps, key=abs)
+                    skin = manager.skins[outlines.block[edge]]
+                    turned = outlines.edge_direction[across] * along
+                    is_parallel = turned.real > 0 and abs(turned.imag) <= np.sin(np.radians(2))
+                    if is_parallel and abs(gap) <= skin and abs(gap.imag) <= 0.05 * skin:
+                        distance = abs(contacts.position[other] - contacts.position[row])
+                        best = min(best, (distance, other))
+        found.append(best[1])
+    return found
+
+
+def test_neighbours_are_found_as_by_a_loop_over_all_pairs():
+    """In a wall of bricks, whose seams meet faces everywhere; some blocks have another law."""
+    text = f"law = 'rock'\n[laws.rock]\n{COULOMB}[laws.other]\n{coulomb(0.2, 2e9, 1e9)}"
+    text += block("floor", box=[9.0, 1.0], at=[0.0, -0.5], fixed=True)
+    for row in range(3):
+        for i in range(4):
+            text += block(f"{row} {i}", box=[1.0, 0.5], at=[i + 0.5 * (row % 2), 0.25 + 0.5 * row])
+    text += "[[joint]]\nbetween = ['1 1', '2 1']\nlaw = 'other'\n"
+    sim = Simulation(parse(text + "[run]\n" + lines(end=1.0, skin=SKIN)))
+    rng = np.random.default_rng(4)
+    for _ in range(3):
+        bears_load = rng.random(sim.joints.n) < 0.6
+        rows = np.flatnonzero(~bears_load)
+        found = sim.manager.find_neighbours(rows, bears_load)
+        assert found.tolist() == neighbours_one_by_one(sim.manager, rows, bears_load)
+        assert (found >= 0).sum() > 5
+
+
+def test_laws_of_another_dimension_are_refused():
+    """Their joints would be read beyond the end of their arrays."""
+    scene = sliding_slab(COULOMB, split=False)
+    laws = {name: replace(law, plane=None) for name, law in scene.laws.items()}
+    with pytest.raises(ValueError, match=r"'rock' has displacements of 3 components.*plane=0\.0"):
+        Simulation(replace(scene, laws=laws))

@@ -207,7 +207,7 @@ def translation_units(levels: Iterable[int]) -> list[Unit]:
 
     batch.c is compiled three times per width in `levels` (doubles per vector): for joints side by
     side in vectors, whose slider forces are stored as double or as float, and for facets of one
-    joint side by side.
+    joint side by side. contacts.c is compiled once per width.
     """
     baseline = min(LEVELS)
     identity = (f"-DJLAW_LEVELS={sum(levels)}", f'-DJLAW_SOURCES="{hash_sources()}"')
@@ -222,6 +222,7 @@ def translation_units(levels: Iterable[int]) -> list[Unit]:
         floats = (f"-DJL_W={lanes}", f"-DKIND=_{lanes}_float", "-DJLAW_FLOAT_SLIDERS")
         units.append(Unit(batch, lanes, floats))
         units.append(Unit(batch, lanes, contiguous))
+        units.append(Unit(HERE / "contacts.c", lanes, (f"-DKIND=_{lanes}",)))
     return units
 
 

@@ -6,6 +6,7 @@
 #include "elements.h"
 #include "law.h"
 #include "export.h"
+#include "contacts.h"
 #include <stdlib.h>
 
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
@@ -30,6 +31,26 @@ static jlaw_call *find_call(const jlaw_batch *b, int operation)
   LEVEL(2)
 #endif
   return NULL;
+}
+
+/* Geometry (forces = 0) or forces (1) of contacts, for vectors of `lanes` doubles; see contacts.c */
+OUT void jlaw_contact_step(const jlaw_contacts *c, int lanes, int forces)
+{
+#define CONTACTS(W)                                                                  \
+  if (lanes == W) {                                                                  \
+    extern void jlaw_contact_motion_##W(const jlaw_contacts *),                      \
+        jlaw_contact_forces_##W(const jlaw_contacts *);                              \
+    (forces ? jlaw_contact_forces_##W : jlaw_contact_motion_##W)(c);                 \
+  }
+#if JLAW_LEVELS & 8
+  CONTACTS(8)
+#endif
+#if JLAW_LEVELS & 4
+  CONTACTS(4)
+#endif
+#if JLAW_LEVELS & 2
+  CONTACTS(2)
+#endif
 }
 
 /* Run an operation on a batch. Several threads may call this for the same batch: each takes the

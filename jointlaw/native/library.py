@@ -86,6 +86,8 @@ def load_file(path: Path) -> ctypes.CDLL:
     count = ctypes.c_longlong
     library.jlaw_sort_by_block.argtypes = [pointer, count, count, pointer]
     library.jlaw_check_list.argtypes = [pointer, count, count]
+    library.jlaw_contact_step.argtypes = [pointer, ctypes.c_int, ctypes.c_int]
+    library.jlaw_contact_step.restype = None
     return library
 
 

@@ -25,7 +25,8 @@ Why it works as it does:
   interactions are matched by key. Otherwise the known contacts exist, the difference to YADE's
   number of real interactions is the number of new ones, and these have the present `iterMadeReal`.
 - Arrays hold one column per contact, in the order of `interactions`. Law, geometry and forces are
-  computed for all contacts in a few calls of numpy.
+  computed for all contacts in a few calls: of numpy in table mode, which needs no package jointlaw,
+  of its compiled library in live mode, which gives the same bits.
 - The frame of a contact rotates with the bodies. Increments are computed in the mean frame of a
   step, with rotation vectors for which a rigid motion of the pair, however large, gives exactly
   zero.
@@ -71,6 +72,7 @@ class TableLaw:
     """A law as a table, a text file: normal stress by closure, elastic-perfectly plastic shear."""
 
     mode = "table"
+    geometry = None  # compiled geometry of contacts; None: numpy
 
     def __init__(self, path):
         self.table = load_table(path)
@@ -139,6 +141,11 @@ class LiveLaw:
             )
         self.law = law
         self.pool = JointPool(law, track_dissipation)
+        self.geometry = None
+        if self.pool.batch.kernel == "native":
+            from jointlaw.native.contacts import ContactGeometry
+
+            self.geometry = ContactGeometry()
         self._update_places()
 
     def stiffness(self, closure=None):
@@ -147,7 +154,17 @@ class LiveLaw:
 
     def step(self, d, closure, spin):
         """Tractions (3, n) after increments d (3, n)."""
-        return self.batch.update(d.T, where=self.where, tangent=False)[0].T
+        if self.prepared_step is None or len(self.prepared_step.d) != d.shape[1]:
+            self.prepared_step = self._prepare_step(d.shape[1])
+        self.prepared_step.d[:] = d.T
+        self.batch.advance(self.prepared_step)
+        return self.prepared_step.F.T
+
+    def _prepare_step(self, n):
+        """A step of all contacts, whose arrays and sorted list of places are used again."""
+        from jointlaw.kernels.engine import Step
+
+        return Step(np.empty((n, 3)), np.empty((n, 3)), None, self.where)
 
     def add_contacts(self, closure, bonded):
         """Add new contacts: virgin joints at this closure (m; negative before touch).
@@ -170,6 +187,7 @@ class LiveLaw:
         """Update the batch and the places of all contacts in it; None: all places, in order."""
         self.batch = self.pool.batch
         places = self.pool.places
+        self.prepared_step = None
         self.where = None if np.array_equal(places, np.arange(len(self.batch))) else places
 
     def state(self):
@@ -244,8 +262,8 @@ class Joints:
 
     @property
     def F(self):
-        """Tractions (3, n) of the last step in the contacts' frames, Pa."""
-        return self.contact_data["F"]
+        """Tractions (3, n) of the last step in the contacts' frames, Pa, as a copy."""
+        return self.contact_data["F"].copy()
 
     def __len__(self):
         return len(self.contact_data["created"])
@@ -338,11 +356,47 @@ class Joints:
         c = self.contact_data
         x0 = self.x
         q0 = self.q
-        x, q = self.x, self.q = self._read_bodies()
+        self.x, self.q = self._read_bodies()
+        motion = self._motion(x0, q0)
+        closure = motion["closure"]
+        d = motion.pop("d")
+        approach = motion.pop("approach")
+        spin = motion.pop("spin", None)
+        if fresh.size:
+            before = closure[fresh] - approach[fresh]
+            if self.mated:
+                before = np.zeros(len(fresh))
+                d[:, fresh] = 0.0
+            self.law.add_contacts(
+                before, self.last_iteration is None
+            )  # bonds in the first step only
+            d[0, fresh] = closure[fresh] - before
+        F = self.law.step(d, closure, spin)
+        c.update(motion, F=F)
+        self._apply_forces(F, fresh)
+        if self.max_opening < np.inf:
+            for k in np.flatnonzero((closure < -self.max_opening) & ~F.any(axis=0)):
+                O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
+
+    def _motion(self, x0, q0):
+        """Frames of all contacts and increments of their displacements in the step from x0, q0.
+
+        Returns arrays over contacts by name: n, t2, c1, c2, closure; the increments d of the
+        displacement; approach, the displacement of body id1 along the normal; and in table mode
+        spin, by which shear forces rotate in the frame.
+        """
+        c = self.contact_data
+        x = self.x
+        q = self.q
+        if self.law.geometry is not None:
+            given = self._read_other_shapes(x, self._empty_geometry())
+            return self.law.geometry.motion(
+                c, (x0.T, q0.T), (x.T, q.T), self.plane is not None, given
+            )
         b1 = c["b1"]
         b2 = c["b2"]
         q1 = q.take(b1, axis=1)
-        n, un, c1, c2 = self._geometry(x, q1)
+        n, un, c1, c2 = self._geometry(x, q1).values()
         closure = un - c["zero_overlap"]
         t2 = self._tangent(n, q1)
         # displacement of id1 relative to id2 at the contact, in the mean frame of the step: a rigid
@@ -357,26 +411,11 @@ class Joints:
         across = unit(t2 + c["t2"])
         d = np.array([closure - c["closure"], dot(du, across), dot(du, cross(middle, across))])
         spin = self._spin(n, t2, w1 + w2) if self.law.mode == "table" else None
-        if fresh.size:
-            before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
-            if self.mated:
-                before = np.zeros(len(fresh))
-                d[:, fresh] = 0.0
-            self.law.add_contacts(
-                before, self.last_iteration is None
-            )  # bonds in the first step only
-            d[0, fresh] = closure[fresh] - before
-        F = self.law.step(d, closure, spin)
-        force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
-        c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
-        force[:, fresh] -= self._remove_yade_force(fresh)
-        self._apply_forces(force, c1, c2)
-        if self.max_opening < np.inf:
-            for k in np.flatnonzero((closure < -self.max_opening) & ~F.any(axis=0)):
-                O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
+        return {"n": n, "t2": t2, "c1": c1, "c2": c2, "closure": closure, "d": d,
+                "approach": dot(du, n), "spin": spin}  # fmt: skip
 
     def _geometry(self, x, q1):
-        """Normal, overlap, and the contact point relative to either centre."""
+        """Normal n, overlap un, and the contact point c1, c2 relative to either centre, by name."""
         c = self.contact_data
         r = x.take(c["b2"], axis=1) - x.take(c["b1"], axis=1)
         R1 = c["R1"]
@@ -384,20 +423,30 @@ class Joints:
         if self.plane is not None:
             n = rotate(q1, c["plane"])
             c1 = r * (R1 / (R1 + R2))
-            return n, -dot(r, n), c1, c1 - r
+            return {"n": n, "un": -dot(r, n), "c1": c1, "c2": c1 - r}
         length = np.sqrt(dot(r, r))
         n = r / length
         un = R1 + R2 - length
         c1 = n * (R1 - un / 2)
-        c2 = c1 - r
+        return self._read_other_shapes(x, {"n": n, "un": un, "c1": c1, "c2": c1 - r})
+
+    def _empty_geometry(self):
+        """Arrays for n, un, c1, c2 of `_geometry`."""
+        size = len(self)
+        vectors = {name: np.empty((3, size)) for name in ("n", "c1", "c2")}
+        return vectors | {"un": np.empty(size)}
+
+    def _read_other_shapes(self, x, geometry):
+        """Write the geometry of contacts that are not of two spheres, by YADE, into the arrays."""
+        c = self.contact_data
         for k in np.flatnonzero(c["both_spheres"] == 0).tolist():
             geom = self.interactions[k].geom
-            n[:, k] = geom.normal.__getinitargs__()
-            un[k] = geom.penetrationDepth
+            geometry["n"][:, k] = geom.normal.__getinitargs__()
+            geometry["un"][k] = geom.penetrationDepth
             point = np.array(geom.contactPoint.__getinitargs__())
-            c1[:, k] = point - x[:, c["b1"][k]]
-            c2[:, k] = point - x[:, c["b2"][k]]
-        return n, un, c1, c2
+            geometry["c1"][:, k] = point - x[:, c["b1"][k]]
+            geometry["c2"][:, k] = point - x[:, c["b2"][k]]
+        return geometry
 
     def _tangent(self, n, q1):
         """Axis 2: the reference direction of body id1, projected on the contact plane."""
@@ -431,18 +480,38 @@ class Joints:
             phys.shearForce = phys.normalForce = Vector3(0, 0, 0)
         return result
 
-    def _apply_forces(self, force, c1, c2):
-        """Add the forces on id1, the opposite forces on id2, and their torques to the bodies."""
+    def _apply_forces(self, F, fresh):
+        """Add the forces of tractions F on id1, the opposite on id2, and torques to the bodies.
+
+        In a step in which contacts form, the forces that YADE has applied to them are subtracted.
+        """
+        added = None
+        if fresh.size:
+            added = np.zeros((len(self), 3))
+            added[fresh] = -self._remove_yade_force(fresh).T
+        if self.law.geometry is None:
+            force, torque = self._sum_forces(F, added)
+        else:
+            force, torque = self.law.geometry.forces(self.contact_data, F, added, len(self.bodies))
+        # deque: calls without the cost of a loop in Python; zip: no list for each body
+        deque(map(O.forces.addF, self.bodies, zip(*force.T.tolist())), maxlen=0)
+        deque(map(O.forces.addT, self.bodies, zip(*torque.T.tolist())), maxlen=0)
+
+    def _sum_forces(self, F, added):
+        """Forces and torques (bodies, 3) by tractions F (3, n), and forces added (n, 3) on id1."""
         c = self.contact_data
+        n = c["n"]
+        t2 = c["t2"]
+        force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
+        if added is not None:
+            force += added.T
         size = len(self.bodies)
-        torque1 = cross(c1, force)
-        torque2 = cross(force, c2)
+        torque1 = cross(c["c1"], force)
+        torque2 = cross(force, c["c2"])
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
         turn = [np.bincount(c["b1"], t1, size) + np.bincount(c["b2"], t2, size)
                 for t1, t2 in zip(torque1, torque2)]  # fmt: skip
-        # deque: calls without the cost of a loop in Python
-        deque(map(O.forces.addF, self.bodies, zip(*(f.tolist() for f in total))), maxlen=0)
-        deque(map(O.forces.addT, self.bodies, zip(*(t.tolist() for t in turn))), maxlen=0)
+        return np.transpose(total), np.transpose(turn)
 
     # ---------------------------------------------------------------- contacts
 
@@ -555,7 +624,7 @@ class Joints:
             r = x[:, c["b2"][fresh]] - x[:, c["b1"][fresh]]
             across = dot(rotate(q1[:, fresh], self.plane), r)
             c["plane"][:, fresh] = self.plane * np.where(across < 0, -1.0, 1.0)
-        n, un, c1, c2 = self._geometry(x, q1)
+        n, un, c1, c2 = self._geometry(x, q1).values()
         n = n[:, fresh]
         q1 = q1[:, fresh]
         a = rotate(q1, self.azimuth)
@@ -686,7 +755,7 @@ def columns(rows, size):
 
 def read_columns(rows, size):
     """As `columns`, from an iterator over rows, without a list of them."""
-    return np.fromiter(chain.from_iterable(rows), float).reshape(-1, size).T.copy()
+    return np.fromiter(chain.from_iterable(rows), float).reshape(-1, size).T
 
 
 def dot(a, b):

@@ -65,8 +65,11 @@ LIKELY_TESTS = {  # of faults of outputs: by kind and first folder
         "verification/test_scene_by_hand.py verification/test_space_by_hand.py "
         "examples/test_space_scenes.py"
     ),
-    ("keys", "jointlaw"): "unit/test_parameters.py unit/test_seams.py unit/test_keys_of_laws.py",
-    ("keys", "dem_demo"): "verification/test_keys_felt.py",
+    ("keys", "jointlaw"): "unit/test_options_felt.py unit/test_parameters.py unit/test_seams.py",
+    ("keys", "dem_demo"): (
+        "verification/test_keys_felt.py verification/test_space_keys_felt.py "
+        "unit/test_options_felt.py"
+    ),
     ("units", "jointlaw"): (
         "unit/test_units.py unit/test_printed_numbers.py unit/test_laboratory.py "
         "unit/test_pictures.py"
@@ -374,7 +377,10 @@ def line_of(copy, fault):
 
 
 def likely_first(fault, able):
-    """Tests that execute a fault, of likely files and fast ones first, of `LIKELY_TIME` in all."""
+    """Tests that execute a fault, of `LIKELY_TIME` in all.
+
+    First the tests that have the name of a key or an option, then likely files, then fast ones.
+    """
     kind = fault.kind, Path(fault.file).parts[0]
     likely = [f"tests/{name}" for name in LIKELY_TESTS.get(kind, TESTS_OF_PAGES).split()]
 
@@ -390,7 +396,9 @@ def likely_first(fault, able):
             left -= 0.0 if is_unknown else seconds
             if file in likely if is_unknown else left > 0.0 or not chosen:
                 chosen.append(name)
-    return chosen
+    # a list is tested by iterating over it: the test of a key or an option has its name
+    names = [word for word in fault.what.split() if word not in ("key", "is", "ignored")]
+    return sorted(chosen, key=lambda test: not all(name in test for name in names))
 
 
 def compatible(faults):

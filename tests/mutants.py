@@ -60,10 +60,12 @@ OPPOSITE_OPERATORS = {
 
 
 LIKELY_TESTS = {  # of faults of outputs: by kind and first folder
-    ("columns", "jointlaw"): "unit/test_laboratory.py unit/test_printed_numbers.py",
+    ("columns", "jointlaw"): (
+        "unit/test_printed_numbers.py verification/test_commands_by_hand.py unit/test_laboratory.py"
+    ),
     ("columns", "dem_demo"): (
         "verification/test_scene_by_hand.py verification/test_space_by_hand.py "
-        "examples/test_space_scenes.py"
+        "verification/test_space_run_by_hand.py unit/test_printed_numbers.py"
     ),
     ("keys", "jointlaw"): "unit/test_options_felt.py unit/test_parameters.py unit/test_seams.py",
     ("keys", "dem_demo"): (
@@ -83,7 +85,7 @@ LIKELY_TESTS = {  # of faults of outputs: by kind and first folder
     ("state", "dem_demo"): "verification/test_saved_state_whole.py",
 }
 TESTS_OF_PAGES = "examples/test_numbers.py examples/test_docs.py examples/test_make_all.py"
-LIKELY_TIME = 20.0  # s of processor time, of the tests that a fault of outputs meets first
+LIKELY_TIME = 10.0  # s of processor time, of the tests that a fault of outputs meets first
 
 
 def with_fields(node, **fields):
@@ -292,12 +294,12 @@ def try_faults_of_outputs(options):
     by_kind = all_faults()
     shares = itertools.cycle(sorted(by_kind))
     counts = collections.Counter(next(shares) for _ in range(options.count))
-    faults = []
-    for kind in sorted(
-        by_kind
-    ):  # each kind by itself, so that a smaller count takes the first ones
+    chosen = []
+    for kind in sorted(by_kind):
         drawn = random.Random(f"{options.seed} {kind}").sample(by_kind[kind], len(by_kind[kind]))
-        faults += drawn[: counts[kind]]
+        chosen.append(drawn[: counts[kind]])  # a smaller count takes the first ones
+    in_turn = itertools.chain(*itertools.zip_longest(*chosen))
+    faults = [fault for fault in in_turn if fault is not None]
     tests = recorded_tests("not slow", options.processes, not options.reuse_records)
     copies = [Copy(f"outputs-{i}") for i in range(options.processes)]
     detected_by = {}

@@ -11,8 +11,8 @@
  * many listed joints is advanced as a whole, and the states of its other joints are restored.
  * Where few joints of a block are listed, joints of several blocks are gathered into a copy,
  * advanced, and copied back (copy_lanes: one shuffle per row). A trial step (b->commit = 0) advances
- * a copy of the block, so the states do not change. While a block is advanced the next one is prefetched, which hides the
- * latency of memory for batches larger than the cache.
+ * a copy of the block, so the states do not change. While a block is advanced the next one is
+ * prefetched, which hides the latency of memory for batches larger than the cache.
  *
  * A batch also keeps, in the rows after the state, Phi and Phi' of the first-loading curve of every
  * facet (and, if asperities yield, the same at the plastic indentation). The values at the end of a
@@ -33,6 +33,7 @@
 #include "elements.h"
 #define JL_BATCH 1
 #include "law.h"
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -108,14 +109,25 @@ static double *state_of(const jlaw_batch *b, long long joint)
   return b->state + joint / BLOCK * BLOCK * b->rows + joint % BLOCK;
 }
 
+/* Zeros for `blocks` blocks of states, aligned to a cache line: a row that lies in two lines costs two
+ * accesses. Returns their address in the allocated memory, or NULL if no memory is left. */
+static double *allocate_blocks(const jlaw_batch *b, int blocks, void **memory)
+{
+  *memory = calloc((size_t) blocks * (size_t) b->rows * BLOCK * sizeof(double) + JLAW_CACHE_LINE, 1);
+  if (!*memory) return NULL;
+  const uintptr_t first = (uintptr_t) *memory + JLAW_CACHE_LINE - 1;
+  return (double *) (first / JLAW_CACHE_LINE * JLAW_CACHE_LINE);
+}
+
 /* Advance joints first to last - 1; `first` is a multiple of BLOCK. Without b->commit no state changes.
  * Returns 0, or -1 if no memory is left. */
 static int advance_all(const jlaw_batch *b, long first, long last)
 {
   const size_t rows = (size_t) b->rows, size = rows * BLOCK;
+  void *memory = NULL;
   double *copy = NULL;
   if (!b->commit) {
-    copy = (double *) calloc(size, sizeof *copy);
+    copy = allocate_blocks(b, 1, &memory);
     if (!copy) return -1;
   }
   for (long start = first; start < last; start += BLOCK) {
@@ -126,7 +138,7 @@ static int advance_all(const jlaw_batch *b, long first, long last)
     for (int l = 0; l < BLOCK; l++) row[l] = l < count ? start + l : NOT_LISTED;
     advance_block(b, block, copy ? 0 : size, row);
   }
-  free(copy);
+  free(memory);
   return 0;
 }
 
@@ -223,10 +235,13 @@ static void advance_in_place(const jlaw_batch *b, const joint_group *g, double *
   if (others) copy_lanes(copy, others, block, others, rows);
 }
 
-/* Advance gathered joints in `copy`, return them to their blocks, and empty the group */
-static void advance_gathered(const jlaw_batch *b, gathered_group *g, double *copy)
+/* Advance gathered joints in `copy`, return them to their blocks, and empty the group. next: block to
+ * prefetch meanwhile, or NULL */
+static void advance_gathered(const jlaw_batch *b, gathered_group *g, double *copy,
+                             const double *next)
 {
-  advance_block(b, copy, 0, g->group.row);
+  const uintptr_t offset = next ? (uintptr_t) next - (uintptr_t) copy : 0;
+  advance_block(b, copy, (size_t) ((intptr_t) offset / (intptr_t) sizeof *copy), g->group.row);
   for (int i = 0; b->commit && i < g->sources; i++)
     copy_lanes(copy, g->source[i].copy_lanes, g->source[i].block, g->source[i].lanes,
                (size_t) b->rows);
@@ -234,12 +249,22 @@ static void advance_gathered(const jlaw_batch *b, gathered_group *g, double *cop
   g->count = g->sources = 0;
 }
 
-/* Add the joints of a group in `block` to the joints that were gathered into `copy` */
-static void gather(const jlaw_batch *b, const joint_group *group, double *block, gathered_group *g,
-                   double *copy)
+static void prefetch_block(const jlaw_batch *b, const double *block)
 {
+  for (int r = 0; r < b->rows; r++) __builtin_prefetch(block + (size_t) r * BLOCK, 1);
+}
+
+/* Add the joints of a group in `block` to the joints that were gathered into `copy`. next: the block
+ * that is gathered next, or NULL */
+static void gather(const jlaw_batch *b, const joint_group *group, double *block,
+                   const double *next, gathered_group *g, double *copy)
+{
+  if (next && g->count + count_lanes(group->lanes) <= BLOCK) { /* else in advance_gathered */
+    prefetch_block(b, next);
+    next = NULL;
+  }
   for (int remaining = group->lanes; remaining;) {
-    if (g->count == BLOCK) advance_gathered(b, g, copy);
+    if (g->count == BLOCK) advance_gathered(b, g, copy, next);
     int taken = 0, copy_set = 0;
     for (int l = 0; l < BLOCK && g->count < BLOCK; l++) {
       if (!(remaining >> l & 1)) continue;
@@ -272,18 +297,14 @@ static void prefetch_rows(const jlaw_batch *b, const double *array, int size, lo
     prefetch_numbers(array + (size_t) b->entries[k].row * size, size);
 }
 
-static void prefetch_block(const jlaw_batch *b, const double *block)
-{
-  for (int r = 0; r < b->rows; r++) __builtin_prefetch(block + (size_t) r * BLOCK, 1);
-}
-
 /* Advance entries first to last - 1 of a list. A block of joints belongs to the thread that takes
  * its first entry. Returns 0, or -1 if no memory is left. */
 static int advance_listed(const jlaw_batch *b, long first, long last)
 {
   const size_t rows = (size_t) b->rows, size = rows * BLOCK;
   const int dim = b->law->dim;
-  double *copy = (double *) calloc(2 * size, sizeof *copy);
+  void *memory;
+  double *copy = allocate_blocks(b, 2, &memory);
   if (!copy) return -1;
   gathered_group gathered = {empty_group(), 0, 0, {{NULL, 0, 0}}};
   while (first > 0 && first < last && block_of_entry(b, first) == block_of_entry(b, first - 1)) first++;
@@ -300,13 +321,13 @@ static int advance_listed(const jlaw_batch *b, long first, long last)
       const long long next = start < last ? block_of_entry(b, start) - block : 0;
       advance_in_place(b, &group, state, (size_t) next * size, copy);
     } else {
-      if (start < last) prefetch_block(b, state_of(b, block_of_entry(b, start) * BLOCK));
-      gather(b, &group, state, &gathered, copy + size);
+      const double *next = start < last ? state_of(b, block_of_entry(b, start) * BLOCK) : NULL;
+      gather(b, &group, state, next, &gathered, copy + size);
     }
     prefetch_rows(b, b->d, dim, start + BLOCK, start + 2 * BLOCK);
   }
-  advance_gathered(b, &gathered, copy + size);
-  free(copy);
+  advance_gathered(b, &gathered, copy + size, NULL);
+  free(memory);
   return 0;
 }
 

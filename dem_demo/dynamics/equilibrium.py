@@ -14,7 +14,7 @@ contact manager keeps it as a negative closure offset.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -108,12 +108,23 @@ def create_joints(
     Returns the sliding (k, 1) in m with which the joints start, and sets the closure offsets of the
     manager: closure and sliding under in-situ stress, zero without it.
     """
-    old_row = manager.rebuild(blocks.motion, blocks.neighbour_pairs())
-    joints.rearrange(old_row, manager.law, manager.face_pairs)
+    _find_drawn_contacts(scene, blocks, manager)
+    return _start_joints(scene, manager, joints)
+
+
+def _find_drawn_contacts(scene: Scene, blocks: Blocks, manager: ContactManager) -> None:
+    """Find the contacts of blocks as drawn, and the loads of the blocks."""
+    manager.rebuild(blocks.motion, blocks.neighbour_pairs())
     apply_loads(scene, blocks, manager)
+
+
+def _start_joints(scene: Scene, manager: ContactManager, joints: Joints) -> np.ndarray:
+    """Give virgin joints to the contacts of blocks as drawn; see `create_joints`."""
+    contacts = manager.contacts
+    is_new = np.full(len(contacts.area), -1)
+    joints.rearrange(is_new, manager.law, manager.face_pairs)
     if scene.in_situ is None or not joints.n:
         return np.zeros((joints.n, 1))
-    contacts = manager.contacts
     stress = _in_situ_stress(scene, contacts)
     stress[contacts.length < MIN_LENGTH] = 0.0
     skin = float(scene.skins.min())
@@ -266,40 +277,62 @@ def settle(
     return sliding, verdict
 
 
+class DrawnBlocks(NamedTuple):
+    """Blocks of a scene as drawn, with their loads, and the manager of their contacts: what scenes
+    have in common that differ in the laws of their joints alone."""
+
+    blocks: Blocks
+    manager: ContactManager
+
+
+def drawn_blocks(scene: Scene) -> DrawnBlocks:
+    """The blocks of a scene as drawn."""
+    blocks = Blocks(scene)
+    manager = ContactManager(scene, blocks.motion)
+    _find_drawn_contacts(scene, blocks, manager)
+    return DrawnBlocks(blocks, manager)
+
+
 def equilibrium_displacements(
-    scene: Scene, guess: np.ndarray | None = None, unstable: np.ndarray | None = None
+    scene: Scene,
+    guess: np.ndarray | None = None,
+    unstable: np.ndarray | None = None,
+    drawn: DrawnBlocks | None = None,
 ) -> np.ndarray | None:
     """Displacements (m,) of the free motions at which virgin joints carry a scene as drawn.
 
     Scaled by the square root of the inertia; None without an equilibrium. All loads act at
     once. guess: displacements of a similar scene from which the search starts, by default the stick
     predictor. unstable (n,): blocks that need no equilibrium; they move away, so their contacts and
-    bolts bear nothing.
+    bolts bear nothing. drawn: the blocks of this scene, or of a scene that differs in its laws
+    alone, if they are known.
     """
-    search, is_unstable = _search_as_drawn(scene, unstable)
+    search, is_unstable = _search_as_drawn(scene, unstable, drawn)
     start = search.stick_predictor() if guess is None else guess
     solution = search.solve(start, is_unstable, name_unstable=False)
     return solution.displacement if solution.verdict is Verdict.EQUILIBRIUM else None
 
 
-def stick_displacements(scene: Scene, unstable: np.ndarray | None = None) -> np.ndarray:
+def stick_displacements(
+    scene: Scene, unstable: np.ndarray | None = None, drawn: DrawnBlocks | None = None
+) -> np.ndarray:
     """Displacements (m,) of the free motions of a scene as drawn if no joint can slide.
 
-    A guess for `equilibrium_displacements`, with the same units and `unstable` (n,) blocks.
+    A guess for `equilibrium_displacements`, with the same units, `unstable` (n,) blocks and
+    `drawn` blocks.
     """
-    search, _ = _search_as_drawn(scene, unstable)
+    search, _ = _search_as_drawn(scene, unstable, drawn)
     return search.stick_predictor()
 
 
 def _search_as_drawn(
-    scene: Scene, unstable: np.ndarray | None
+    scene: Scene, unstable: np.ndarray | None, drawn: DrawnBlocks | None
 ) -> tuple[EquilibriumSearch, np.ndarray]:
     """The search of a scene as drawn, without forces on the contacts and bolts of the unstable
     blocks; and the mask (n,) of these."""
-    blocks = Blocks(scene)
+    blocks, manager = drawn or drawn_blocks(scene)
     joints = Joints(scene)
-    manager = ContactManager(scene, blocks.motion)
-    sliding = create_joints(scene, blocks, manager, joints)
+    sliding = _start_joints(scene, manager, joints)
     search = EquilibriumSearch(static_system(scene, blocks, manager, joints, sliding))
     is_unstable = np.zeros(len(blocks.is_free), bool) if unstable is None else unstable
     contacts = manager.contacts

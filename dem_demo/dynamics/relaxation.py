@@ -158,7 +158,10 @@ class Relaxation:
         self.error: Exception | None = None  # of a step of the law in Python
         self.callbacks: list[Any] = []  # which C holds
         self.zero = np.zeros(1, np.int64)
-        self.steps = [self._law_step(one, np.flatnonzero(law == i)) for i, one in enumerate(laws)]
+        bears = area > 0.0  # overlaps without length exert no force
+        self.steps = [
+            self._law_step(one, np.flatnonzero((law == i) & bears)) for i, one in enumerate(laws)
+        ]
         relaxed_laws = [
             self._law_arrays(one, *step) for one, step in zip(laws, self.steps, strict=True)
         ]

@@ -133,17 +133,18 @@ class StiffnessPattern:
         diagonal = np.arange(m) * (m + 1)
         codes, place = np.unique(np.concatenate([code, diagonal, [m * m]]), return_inverse=True)
         self.m = m
-        self.place = place[: len(code)]
+        self.place = place[: len(code)].reshape(len(columns), columns.shape[1] ** 2)
         self.diagonal = place[len(code) : -1]
         self.count = len(codes) - 1  # the last one collects the entries of prescribed motions
         column_of_entry, row_of_entry = np.divmod(codes[:-1], max(m, 1))
         self.rows = row_of_entry.astype(np.int32)
         self.starts = np.searchsorted(column_of_entry, np.arange(m + 1)).astype(np.int32)
 
-    def matrix(self, elements: np.ndarray) -> csc_array:
-        """The sum of the stiffness (elements, 2 dof, 2 dof) of all elements; it has an entry for
-        every place of the diagonal."""
-        entries = np.bincount(self.place, elements.ravel(), self.count + 1)[:-1].astype(float)
+    def matrix(self, stiffness: np.ndarray, elements: np.ndarray) -> csc_array:
+        """The sum of the stiffness (n, 2 dof, 2 dof) of n elements, given their numbers (n,); it
+        has an entry for every place of the diagonal."""
+        place = self.place[elements].ravel()
+        entries = np.bincount(place, stiffness.ravel(), self.count + 1)[:-1].astype(float)
         return csc_array((entries, self.rows, self.starts), shape=(self.m, self.m))
 
     def with_diagonal(self, matrix: csc_array, diagonal: np.ndarray) -> csc_array:
@@ -379,13 +380,17 @@ class EquilibriumSearch:
 
     def _assemble_stiffness(self, stiffness: Stiffness) -> csc_array:
         """Stiffness (m, m) of the blocks from the stiffness of joints and bolts."""
-        k = self.k
-        rows = self.system.kinematics
-        weighted = np.einsum("kcd,kdj->kcj", self.area[:k, None, None] * stiffness.joints, rows)
-        of_joints = np.einsum("kci,kcj->kij", rows, weighted)
+        exerts = stiffness.joints.any(axis=(1, 2)) & (self.area[: self.k] > 0.0)
+        acting = np.flatnonzero(exerts)  # the others would add zeros
+        rows = self.system.kinematics[acting]
+        weighted = self.area[acting, None, None] * stiffness.joints[acting]
+        weighted = sum(weighted[:, :, c, None] * rows[:, c, None, :] for c in range(self.dim))
+        of_joints = sum(rows[:, c, :, None] * weighted[:, c, None, :] for c in range(self.dim))
         rates = self.bolts.kinematics
         of_bolts = stiffness.bolts[:, None, None] * rates[:, :, None] * rates[:, None, :]
-        return self.pattern.matrix(np.concatenate([of_joints, of_bolts]))
+        bolts = self.k + np.arange(len(rates))
+        elements = np.concatenate([of_joints, of_bolts])
+        return self.pattern.matrix(elements, np.concatenate([acting, bolts]))
 
     def stick_predictor(self) -> np.ndarray:
         """First guess (m,): displacements if no joint can slide.

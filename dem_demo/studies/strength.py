@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from jointlaw.support.files import write_json
 
-from ..dynamics.equilibrium import equilibrium_displacements, stick_displacements
+from ..dynamics.equilibrium import drawn_blocks, equilibrium_displacements, stick_displacements
 from ..dynamics.simulation import Simulation
 from ..output.folder import TRIALS
 from ..output.pictures import Pictures
@@ -212,16 +212,18 @@ def factor_of_safety(
     if bound == 0.0:
         return None
 
+    find_blocks = cache(partial(drawn_blocks, scene))
+
     @cache
     def sticking() -> np.ndarray:
         """Guess of trials that have no other: joints that cannot slide have the same stiffness
         with every strength."""
-        return stick_displacements(scene, is_excluded)
+        return stick_displacements(scene, is_excluded, find_blocks())
 
     def solve(log_factor: float, guess: np.ndarray | None) -> np.ndarray | None:
         reduced = weakened(scene, float(np.exp(log_factor)))
         start = sticking() if guess is None else guess
-        return equilibrium_displacements(reduced, start, is_excluded)
+        return equilibrium_displacements(reduced, start, is_excluded, find_blocks())
 
     with LimitSearch(solve, trials, f"{name}: factor of safety") as search:
         if bound is None:

@@ -60,6 +60,9 @@ def factor_of_bray(half_apex, stress, normal_stiffness, shear_stiffness):
         (20, 3e4, 1e10, 2e9),  # below 1: softened shear springs would make it safer than it is
         (30, 1e5, 1e10, 1e9),
         (15, 3e4, 1e10, 3e9),
+        pytest.param((25, 2e5, 1e10, 1e10), marks=pytest.mark.slow),
+        pytest.param((35, 3e5, 5e9, 1e9), marks=pytest.mark.slow),
+        pytest.param((10, 2e4, 2e10, 2e9), marks=pytest.mark.slow),
     ],
 )
 def test_roof_wedge_has_the_factor_of_bray(wedge):

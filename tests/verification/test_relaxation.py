@@ -139,7 +139,7 @@ def arch(thickness, voussoirs, radius=5.0, friction=5.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("voussoirs", [16, 32, 64])
+@pytest.mark.parametrize("voussoirs", [16, 32, 64, 96])
 def test_least_thickness_of_a_semicircular_arch(voussoirs):
     """Milankovitch (1907): 0.1075 of the radius."""
     assert equilibrium_displacements(arch(0.1085, voussoirs)) is not None

@@ -5,7 +5,7 @@ the number of contacts changes there are new arrays, and a new `StepArrays` with
 """
 
 import ctypes
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +75,7 @@ class Arrays(ctypes.Structure):
 
     def call(self, name: str, *arguments: Any) -> Any:
         """Call the function `dem_NAME` of the library with these arrays."""
-        return getattr(library(), f"dem_{name}")(ctypes.byref(self), *arguments)
+        return find_function(name)(ctypes.byref(self), *arguments)
 
 
 class StepArrays(Arrays):
@@ -93,19 +93,23 @@ class StepArrays(Arrays):
         The results of a step do not depend on the number of threads, which may exceed one only for
         a geometry that has parts.
         """
-        n, k, size = self.n_blocks, self.n_contacts, layout.BLOCKS_PER_PART
+        n = self.n_blocks
+        k = self.n_contacts
+        size = layout.BLOCKS_PER_PART
+        first_block = np.array([0, n])
+        if threads > 1:
+            points = np.bincount(block_a, minlength=n) + np.bincount(block_b, minlength=n)
+            start = np.arange(0, n, size)  # of each part
+            work_before = np.concatenate([[0], np.cumsum(points + 1)])
+            shares = np.arange(1, threads) / threads * work_before[-1]
+            inner = start[np.searchsorted(work_before[start[1:]], shares)]
+            first_block = np.concatenate([[0], inner, [n]])
         self.threads = threads
-        points = np.bincount(block_a, minlength=n) + np.bincount(block_b, minlength=n)
-        part = np.arange(0, n + size, size)  # first block of each part
-        before = np.concatenate([[0], np.cumsum(points + 1)])[np.minimum(part, n)]
-        shares = np.arange(1, threads) / threads * before[-1]
-        inner = part[np.searchsorted(before, shares)]
-        first_block = np.concatenate([[0], inner, [n]]).astype(np.int64)
         self.n_ranges = threads
         self.bind(
-            first_block=np.minimum(first_block, n),
+            first_block=first_block,
             point_forces=np.zeros((k, 2, self.dim)),
-            block_sums=np.zeros((len(part), len(layout.BLOCK_SUMS))),
+            block_sums=np.zeros((n // size + 1, len(layout.BLOCK_SUMS))),
             point_sums=np.zeros((k // layout.POINTS_PER_PART + 1, len(layout.POINT_SUMS))),
         )
 
@@ -178,9 +182,15 @@ class RelaxedBolts(Arrays):
     _fields_ = [(name, field.ctype) for name, field in layout.RELAXED_BOLTS.items()]
 
 
+@cache
+def find_function(name: str) -> Any:
+    """Return the function `dem_NAME` of the library."""
+    return getattr(library(), f"dem_{name}")
+
+
 def function_address(name: str) -> int:
     """Return the address of the function `dem_NAME`, for a structure that holds it."""
-    return ctypes.cast(getattr(library(), f"dem_{name}"), ctypes.c_void_p).value or 0
+    return ctypes.cast(find_function(name), ctypes.c_void_p).value or 0
 
 
 def address(array: Any) -> int:

@@ -233,7 +233,8 @@ class Simulation:
         self.joints.advance(self.scene.run.law_steps)
         self.steps_since_change += 1
         drives = self.blocks.drives
-        drives.aim[:] = drives.velocity(self.time, self.dt)
+        if len(drives.rows):
+            drives.aim[:] = drives.velocity(self.time, self.dt)
         self.energy_balance.energy[BOLTS] = self.blocks.bolts.pull()
         self.arrays.finish_step(self.dt)
         if self.arrays.stiffened:

@@ -26,7 +26,7 @@
 #include "export.h"
 #include "layout.h"
 
-enum { MAX_MIDPOINT_ITERATIONS = 20 };
+enum { MAX_DIM = 3, MAX_MIDPOINT_ITERATIONS = 20 };
 static const double MIDPOINT_TOLERANCE = 1e-15; /* of the angular velocity */
 
 /* Hash of the sources that this library was built from */
@@ -70,18 +70,21 @@ static void raise_to(long long *number, long long value)
 INLINE void set_increments(dem_step *sim, double dt, long long begin, long long end, const int dim,
                            const int dof)
 {
+  double factor[MAX_DIM]; /* of a rate of closure or shear */
+  long long too_deep = -1;
+  for (int c = 0; c < dim; c++) factor[c] = dt / (sim->law_steps * sim->reduction[c]);
   for (long long i = begin; i < end; i++) {
     const double closure = sim->closure[i], offset = sim->closure_offset[i];
     const double limit =
         smaller(sim->max_overlap[sim->block_a[i]], sim->max_overlap[sim->block_b[i]]);
-    if (sim->area[i] > 0.0 && closure > limit) raise_to(&sim->too_deep, i);
+    if (sim->area[i] > 0.0 && closure > limit) too_deep = i;
     const double joint_closure = closure - (closure > 0.0 || offset < 0.0 ? offset : 0.0);
     double *d = sim->laws[sim->law[i]].d + dim * sim->place[i];
     compute_rates(sim, i, dim, dof);
     d[0] = (joint_closure - sim->delta[dim * i]) / sim->law_steps;
-    for (int c = 1; c < dim; c++)
-      d[c] = sim->rates[dim * i + c] * dt / (sim->law_steps * sim->reduction[c]);
+    for (int c = 1; c < dim; c++) d[c] = sim->rates[dim * i + c] * factor[c];
   }
+  raise_to(&sim->too_deep, too_deep);
 }
 
 /* Rates of all contact points, and displacement increments of their joints, at their places for
@@ -291,19 +294,22 @@ INLINE void find_forces_on_blocks(dem_step *sim, double dt, long long begin, lon
     sim->previous_forces[size + at] = driven[at];
     total[at] = damped[at] = driven[at] = 0.0;
   }
+  const int is_all = begin == 0 && end == n;
   for (long long i = 0; i < sim->n_contacts; i++) {
     const long long a = sim->block_a[i], b = sim->block_b[i];
-    if (a >= begin && a < end && sim->is_mobile[a])
+    if (is_all || (a >= begin && a < end))
       add_point_forces(sim, i, 0, total + dof * a, damped + dof * a, dim, dof);
-    if (b >= begin && b < end && sim->is_mobile[b])
+    if (is_all || (b >= begin && b < end))
       add_point_forces(sim, i, 1, total + dof * b, damped + dof * b, dim, dof);
   }
-  for (long long i = begin; i < end; i++) {
-    if (!sim->is_mobile[i]) continue;
-    for (long long at = dof * i; at < dof * (i + 1); at++)
-      total[at] =
-          (total[at] + damped[at]) + (sim->gravity[at] + sim->loads[at] + sim->bolt_forces[at]);
-  }
+  for (long long i = begin; i < end; i++)
+    for (int j = 0; j < dof; j++) {
+      const long long at = dof * i + j;
+      if (!sim->is_mobile[i]) total[at] = damped[at] = 0.0;
+      else
+        total[at] = (total[at] + damped[at]) +
+                    (sim->gravity[at] + sim->loads[at] + sim->bolt_forces[at]);
+    }
   for (long long i = 0; i < sim->n_driven; i++) {
     const long long block = sim->driven_block[i], axis = sim->driven_axis[i];
     const long long at = dof * block + axis;

@@ -326,39 +326,37 @@ class FaceContactManager:
         loaded = np.flatnonzero(bears_load)
         position = contacts.point
         axis_2 = contacts.directions[:, 1]
-        neighbours = np.full(len(rows), -1)
-        for i, row in enumerate(rows):
-            skin = 0.5 * (self.skins[contacts.block_a[row]] + self.skins[contacts.block_b[row]])
-            distance = np.linalg.norm(position[loaded] - position[row], axis=1)
-            step = np.abs(contacts.closure[loaded] - contacts.closure[row])
-            cosine = axis_2[loaded] @ axis_2[row]
-            is_candidate = (distance <= skin) & (step <= MAX_SEAM_STEP * skin)
-            is_candidate &= (self.law[loaded] == self.law[row]) & (cosine >= MIN_SEAM_COSINE)
-            candidates = loaded[is_candidate]
-            is_neighbour = np.zeros(len(candidates), bool)
-            for shared, other in ((0, 1), (1, 0)):
-                has_shared = contacts.keys[shared, candidates] == contacts.keys[shared, row]
-                across_seam = contacts.keys[other, candidates]
-                is_coplanar = self._are_coplanar(across_seam, contacts.keys[other, row], skin)
-                is_neighbour |= has_shared & is_coplanar
-            if is_neighbour.any():
-                nearest = distance[is_candidate][is_neighbour].argmin()
-                neighbours[i] = candidates[is_neighbour][nearest]
-        return neighbours
+        pairs = [_find_equal(keys[rows], keys[loaded]) for keys in contacts.keys[:2]]
+        number, candidate = np.concatenate(pairs, axis=1)
+        row = rows[number]
+        candidate = loaded[candidate]
+        side = np.repeat([1, 0], [len(one) for one, _ in pairs])  # of the faces across the seam
+        skin = 0.5 * (self.skins[contacts.block_a[row]] + self.skins[contacts.block_b[row]])
+        distance = np.linalg.norm(position[candidate] - position[row], axis=1)
+        step = np.abs(contacts.closure[candidate] - contacts.closure[row])
+        cosine = np.einsum("pj,pj->p", axis_2[candidate], axis_2[row])
+        is_neighbour = (distance <= skin) & (step <= MAX_SEAM_STEP * skin)
+        is_neighbour &= (self.law[candidate] == self.law[row]) & (cosine >= MIN_SEAM_COSINE)
+        near = np.flatnonzero(is_neighbour)
+        across_seam = contacts.keys[side[near], candidate[near]]
+        other = contacts.keys[side[near], row[near]]
+        is_neighbour[near] = self._are_coplanar(across_seam, other, skin[near])
+        distance[~is_neighbour] = np.inf
+        return _find_nearest(len(rows), number, candidate, distance)
 
-    def _are_coplanar(self, faces: np.ndarray, other: int, skin: float) -> np.ndarray:
-        """Whether faces (m,) of other blocks continue the face `other` across a seam.
+    def _are_coplanar(self, faces: np.ndarray, others: np.ndarray, skin: np.ndarray) -> np.ndarray:
+        """Whether faces (m,) of other blocks continue the faces `others` (m,) across a seam.
 
         They are parallel within 2 degrees, and their planes differ by less than `MAX_SEAM_STEP` of
-        a skin (m).
+        a skin (m,) in m.
         """
         surfaces = self.blocks.surfaces
-        normal = surfaces.normal[other]
-        corner = surfaces.vertex[surfaces.corner[surfaces.first_corner[faces]]]
-        step = (corner - surfaces.ring(other)[0]) @ normal
-        is_parallel = surfaces.normal[faces] @ normal >= MIN_SEAM_COSINE
+        normal = surfaces.normal[others]
+        first_corner = surfaces.vertex[surfaces.corner[surfaces.first_corner[:-1]]]
+        step = np.einsum("mj,mj->m", first_corner[faces] - first_corner[others], normal)
+        is_parallel = np.einsum("mj,mj->m", surfaces.normal[faces], normal) >= MIN_SEAM_COSINE
         is_level = np.abs(step) <= MAX_SEAM_STEP * skin
-        is_of_other_block = surfaces.block_of_face[faces] != surfaces.block_of_face[other]
+        is_of_other_block = surfaces.block_of_face[faces] != surfaces.block_of_face[others]
         return is_parallel & is_level & is_of_other_block
 
     def between(self, one: int, other: int) -> np.ndarray:
@@ -397,3 +395,35 @@ def _nearest(
         nearest[place] = row[is_nearer]
         smallest[place] = distance[is_nearer]
     return nearest, smallest
+
+
+def _find_equal(values: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all pairs of an index into `values` (m,) and one into `known` (k,) with equal numbers.
+
+    Sorted by the index into `values`, then by the index into `known`.
+    """
+    order = np.argsort(known, kind="stable")
+    in_order = known[order]
+    first = np.searchsorted(in_order, values)
+    count = np.searchsorted(in_order, values, side="right") - first
+    index = np.repeat(np.arange(len(values)), count)
+    place = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
+    return index, order[np.repeat(first, count) + place]
+
+
+def _find_nearest(
+    n: int, number: np.ndarray, candidate: np.ndarray, distance: np.ndarray
+) -> np.ndarray:
+    """Return the nearest candidate (n,) of each of n contacts, -1 where there is none.
+
+    number, candidate, distance (p,): contact, its candidate, and the distance of both (m); infinite
+    for no candidate. Of equally near candidates the one with the lowest number is returned.
+    """
+    is_candidate = np.isfinite(distance)
+    number = number[is_candidate]
+    candidate = candidate[is_candidate]
+    order = np.lexsort((candidate, distance[is_candidate], number))
+    nearest = np.full(n, -1)
+    found, first = np.unique(number[order], return_index=True)
+    nearest[found] = candidate[order][first]
+    return nearest

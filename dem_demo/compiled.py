@@ -99,11 +99,10 @@ class StepArrays(Arrays):
         first_block = np.array([0, n])
         if threads > 1:
             points = np.bincount(block_a, minlength=n) + np.bincount(block_b, minlength=n)
-            start = np.arange(0, n, size)  # of each part
             work_before = np.concatenate([[0], np.cumsum(points + 1)])
             shares = np.arange(1, threads) / threads * work_before[-1]
-            inner = start[np.searchsorted(work_before[start[1:]], shares)]
-            first_block = np.concatenate([[0], inner, [n]])
+            inner = np.rint(np.searchsorted(work_before, shares) / size) * size
+            first_block = np.concatenate([[0], np.minimum(inner, n), [n]]).astype(np.int64)
         self.threads = threads
         self.n_ranges = threads
         self.bind(

@@ -21,7 +21,7 @@ from .blocks import Blocks
 from .search import free_motion_matrix
 
 MAX_FRACTION_OF_LIMIT = 0.98  # largest time step, relative to the limit
-MAX_STIFFNESS_GROWTH = 1.25  # of a joint between two checks of the time step
+MAX_STIFFNESS_GROWTH = 1.25  # of a joint between two checks of a time step near its limit
 RECOMPUTE_BELOW = 0.95  # of the lowest bound: the eigenvalues of the scene are computed again
 MIN_STIFFNESS = 0.2  # of the stiffest joint: a joint that barely touches counts as this stiff
 MIN_AREA = 0.02  # of the largest joint: the same for its area; else each touch would be checked
@@ -87,6 +87,8 @@ class TimeStepLimit:
         """Raise SceneError for a time step (s) beyond the limit; else set `checked_stiffness`.
 
         The limit falls at most as the square root of the largest growth of any joint's stiffness.
+        Far below the limit a larger growth is allowed, so that joints that close under the weight
+        of a settling scene do not have it computed in every step.
         """
         allowed = MAX_FRACTION_OF_LIMIT * self.current
         if dt > allowed:
@@ -95,7 +97,8 @@ class TimeStepLimit:
                 f"which has fallen to {self.current:.3g} s as the joints closed; resume with a "
                 "smaller step"
             )
-        growth = min(MAX_STIFFNESS_GROWTH, (allowed / dt) ** 2)
+        headroom = allowed / dt
+        growth = min(max(MAX_STIFFNESS_GROWTH, 0.5 * headroom), headroom**2)
         self.checked_stiffness = growth * self.checked_stiffness
 
 

@@ -450,6 +450,7 @@ INLINE void finish_blocks(dem_step *sim, double dt, long long begin, long long e
                           const int dof)
 {
   const long long n = sim->n_blocks;
+  if (begin >= end) return;
   find_forces_on_blocks(sim, dt, begin, end, dim, dof);
   for (long long part = begin / DEM_BLOCKS_PER_PART; part < parts_of(end, DEM_BLOCKS_PER_PART); part++)
     sum_energies_of_blocks(sim, dt, part, dof);

@@ -160,7 +160,8 @@ def peak_strength(law: jl.Law, stress: ArrayLike) -> np.ndarray:
     step = np.zeros((stresses.size, law.dim))
     peak = np.zeros(stresses.size)
     for slip in np.concatenate([[0.0], _slip_increments(law)]):
-        step[:, 0] = 0.0
+        if slip != step[0, 1]:  # else the last dilation is the first guess
+            step[:, 0] = 0.0
         step[:, 1] = slip
         step[:, 0] = closing_increments(joints, step, condition)
         F, _ = joints.update(step, tangent=False)

@@ -142,6 +142,7 @@ class _Test:
         self.azimuth = azimuth
         self.name = name
         self.rows: list[Array] = []
+        self.last_step = np.zeros(joint.law.dim)
         # unit vectors of the degrees of freedom of the joint in 3-D, (dim, 3)
         if joint.law.dim == 3:
             self.axes = np.eye(3)
@@ -157,12 +158,15 @@ class _Test:
         step = np.concatenate([[0.0], shear])
         try:
             if condition is not None:
+                if shear.any() and np.array_equal(shear, self.last_step[1:]):
+                    step[0] = self.last_step[0]  # first guess: the dilation of the last step
                 (step[0],) = closing_increments(self.joint._batch, step[None], condition)
             F, _ = self.joint.update(step, tangent=False)
         except (NonFiniteError, ArithmeticError) as error:
             raise PathError(
                 f"{self.name} stopped after {len(self.rows)} rows: {error}", self.record()
             ) from error
+        self.last_step = step
         self.append_row(F)
 
     def append_row(self, F: Array) -> None:

@@ -277,7 +277,8 @@ FIELD_VALUES = {"jcs": 100e6, "length": 0.1, "normal_stress": 1e6, "normal_stiff
 
 
 @pytest.mark.parametrize(
-    ("jrc", "jcs"), [(4.0, 100e6), (10.0, 100e6), (16.0, 100e6), (20.0, 200e6)]
+    ("jrc", "jcs"),
+    [(4.0, 100e6), (10.0, 100e6), pytest.param(16.0, 100e6, marks=pytest.mark.slow), (20.0, 200e6)],
 )
 def test_law_from_field_values_has_barton_s_peak(jrc, jcs):
     """Angle of 30 + JRC log10(JCS/stress), displacement within a tenth (the peak is flat)."""

@@ -171,7 +171,7 @@ def test_a_block_at_rest_veers_most_in_its_first_slip():
     assert [azimuth, first, later] == pytest.approx([43.2, 43.2, 43.1], abs=0.3)
 
 
-@pytest.mark.parametrize("cuts", [(0.9,), (0.31, 0.83, 1.4)])
+@pytest.mark.parametrize("cuts", [(0.9,), pytest.param((0.31, 0.83, 1.4), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("rough", [False, True], ids=["coulomb", "rough"])
 def test_block_that_crosses_joints_of_its_bed(rough, cuts):
     """A block that slides obliquely over the seams of its bed, beside the same on one plate.

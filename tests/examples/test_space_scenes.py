@@ -127,10 +127,15 @@ def test_commands_of_the_plane_are_refused(words, tmp_path, capsys, monkeypatch)
 
 
 @pytest.mark.parametrize(
-    ("name", "until", "fall"), [("wedge", 0.2, 0.0), ("wedge-across", 0.75, 0.67)]
+    ("name", "until", "state", "fall"),
+    [
+        ("wedge", 0.2, "stable", 0.0),
+        ("wedge-across", 0.5, "displacing", 0.3),
+        pytest.param("wedge-across", 1.0, "failed", 1.2, marks=pytest.mark.slow),
+    ],
 )
-def test_wedges_in_motion(name, until, fall, tmp_path, capsys):
-    """Along the line of intersection the wedge does not move, across it falls 0.67 m in 0.75 s.
+def test_wedges_in_motion(name, until, state, fall, tmp_path, capsys):
+    """Along the line of intersection the wedge does not move, across it falls 1.2 m in a second.
 
     All files of the run tell the same story; the balance of energy holds.
     """
@@ -138,7 +143,7 @@ def test_wedges_in_motion(name, until, fall, tmp_path, capsys):
     falls = name == "wedge-across"
     assert ("1 block has no static equilibrium and will move" in capsys.readouterr().out) == falls
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["rocks"][0]["state"] == ("failed" if falls else "stable")
+    assert summary["rocks"][0]["state"] == state
     assert summary["model_time_s"] == pytest.approx(until, abs=1e-3)
     assert summary["max_energy_error"] < 1e-3
     with (tmp_path / "blocks.csv").open(newline="") as file:

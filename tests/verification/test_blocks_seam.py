@@ -88,7 +88,11 @@ def on_both_bases(end=1.2, **keys):
 
 
 @LAWS
-@pytest.mark.parametrize("slant", [0.0, 0.4, -0.4], ids=["square", "forward", "back"])
+@pytest.mark.parametrize(
+    "slant",
+    [0.0, 0.4, pytest.param(-0.4, marks=pytest.mark.slow)],
+    ids=["square", "forward", "back"],
+)
 def test_normal_force_between_floor_and_roof(law, slant):
     """Without the joint of its neighbour the contact would start anew: the slab loses its dilation
     and half of its load. With it, the forces differ by the time step, 4e-4 at the seam."""

@@ -35,6 +35,7 @@ dip = 65
 dip_direction = 340
 spacing = 1.5
 """
+COARSE = SETS.replace("1.1", "2.0").replace("1.3", "2.2").replace("1.5", "2.4")
 CUBE = '[[rock]]\nname = "mass"\nbox = [6, 6, 6]\nat = [0, 0, 3]\n'
 STRESS = np.array([[4e6, 0.4e6, 0.2e6], [0.4e6, 3e6, -0.3e6], [0.2e6, -0.3e6, 2e6]])
 COMPONENTS = [4e6, 3e6, 2e6, 0.4e6, -0.3e6, 0.2e6]
@@ -269,16 +270,20 @@ def normals_of(statics):
 
 def test_other_values_of_the_keys_are_felt():
     base = {"stress": COMPONENTS} | dict.fromkeys(SIDES, "fixed")
-    still = Statics(mass(lines(**base), ""))
+    still = Statics(mass(lines(**base), "", sets=COARSE))
     for key in SIDES:
-        other = Statics(mass(lines(**base | {key: "rollers"}), ""))
+        other = Statics(mass(lines(**base | {key: "rollers"}), "", sets=COARSE))
         assert (other.is_free_motion != still.is_free_motion).any()
         assert (other.is_free_motion.sum(axis=0) >= still.is_free_motion.sum(axis=0)).all()
-    other = Statics(mass(lines(**base | {"stress": [4e6, 3e6, 2e6, 0, 0, 0]}), ""))
+    axial = lines(**base | {"stress": [4e6, 3e6, 2e6, 0, 0, 0]})
+    other = Statics(mass(axial, "", sets=COARSE))
     assert not np.allclose(other.start, still.start, rtol=1e-3, atol=0)
-    deep = [Statics(mass(f"k0 = 1\nsurface = {s}\n")) for s in ("[[0, 0, 50]]", "[[0, 0, 60]]")]
+    deep = [
+        Statics(mass(f"k0 = 1\nsurface = {surface}\n", sets=COARSE))
+        for surface in ("[[0, 0, 50]]", "[[0, 0, 60]]")
+    ]
     assert (deep[1].start[:, 0] > deep[0].start[:, 0]).all()
-    default = Statics(mass("k0 = 1\n"))
+    default = Statics(mass("k0 = 1\n", sets=COARSE))
     assert (default.start[:, 0] < deep[0].start[:, 0]).all()
 
 
@@ -309,7 +314,7 @@ CLOSED = CUBE + SETS + "[in_situ]\nstress = [1e9, 1e9, 1e9, 0, 0, 0]\n"
 )
 def test_input_that_in_situ_stress_and_excavation_refuse(text, message):
     with pytest.raises(ValueError, match=message):
-        parse(LAWS + CUBE + SETS + text)
+        parse(LAWS + CUBE + COARSE + text)
 
 
 def test_a_stress_that_closes_joints_too_far_is_refused():

@@ -21,8 +21,8 @@
  * and of the polygon only the strip next to its lowest corner counts, `strip` wide from a tilt of
  * 5 degrees on, wider for smaller tilts, and the whole polygon up to 2 degrees. The upper corners of a
  * strip are open, so the areas count twice there. If it is the product of two edges, the point where
- * they cross is the contact. Blocks that meet along two edges or in a vertex of both have no joint there:
- * areas fade within `fade` of the border of a face, and of the ends of edges that cross. As the directions of the law belong to the face that is stood on, the
+ * they cross is the contact. Blocks that meet in a vertex of both, or along two edges at a large tilt, have
+ * no joint there: areas fade within `fade` of the border of a face, and of the ends of edges that cross. As the directions of the law belong to the face that is stood on, the
  * plane of a contact may be the one of a or of b (`plane_is_of_a`).
  *
  * Nothing here allocates memory or knows a law. Vectors are three doubles.
@@ -289,10 +289,37 @@ static int keep_strip(double (*polygon)[2], int m, const double *gradient, doubl
   return clip(polygon, m, start, end);
 }
 
+/* 1 up to a lower limit, 0 from an upper one on */
+static double falling_ramp(double x, double low, double high)
+{
+  return fmin(fmax((high - x) / (high - low), 0.0), 1.0);
+}
+
+/* Sine of the smaller angle between a contour line of the height over the plane and one of both edges
+ * of a polygon at its lowest corner */
+static double contour_sine(double (*polygon)[2], int m, const double *gradient)
+{
+  int lowest = 0;
+  for (int i = 1; i < m; i++)
+    if (dot_2(gradient, polygon[i]) < dot_2(gradient, polygon[lowest])) lowest = i;
+  double smallest = 1.0;
+  for (int k = 1; k < m; k += m - 2) { /* the next corner, and the one before */
+    const double *here = polygon[lowest], *other = polygon[(lowest + k) % m];
+    const double edge[2] = {other[0] - here[0], other[1] - here[1]};
+    const double sine = dot_2(gradient, edge) / (hypot(gradient[0], gradient[1]) * hypot(edge[0], edge[1]));
+    smallest = fmin(smallest, fabs(sine));
+  }
+  return smallest;
+}
+
 /* Share of its area that a contact along an edge keeps near the border of the face that it lies on:
- * the distance from the border, over `fade`, of the lowest line of the polygon, and at most 1 */
+ * the distance from the border, over `fade`, of the lowest line of the polygon, and at most 1.
+ *
+ * An edge along the border, as one of two equal blocks rocks on the other, keeps its area up to a tilt of
+ * DEM_WHOLE_EDGE_SINE: its contact passes between the planes of both, whose directions hardly differ.
+ * From DEM_NO_EDGE_SINE on its area fades like the area of a corner. */
 static double share_inside(double (*polygon)[2], int m, double (*edges)[2], int m_edges,
-                           const double *gradient, double tie, double fade)
+                           const double *gradient, double sine, double tie, double fade)
 {
   double lowest = HUGE_VAL, farthest = 0.0, ends[2][2] = {{0.0}};
   for (int i = 0; i < m; i++) {
@@ -318,7 +345,11 @@ static double share_inside(double (*polygon)[2], int m, double (*edges)[2], int 
     }
     if (distance > farthest) farthest = distance;
   }
-  return farthest < fade ? farthest / fade : 1.0;
+  const double share = farthest < fade ? farthest / fade : 1.0;
+  const double part =
+      falling_ramp(sine, DEM_WHOLE_EDGE_SINE, DEM_NO_EDGE_SINE) *
+      falling_ramp(contour_sine(polygon, m, gradient), DEM_EDGE_SINE, DEM_CORNER_SINE);
+  return share + (1.0 - share) * part;
 }
 
 /* A face over the plane of another one, along two axes of this plane and its normal */
@@ -359,7 +390,7 @@ static void find_overlap(const raised_face *face, double (*edges)[2], int m_edge
     if (here < out->lowest) out->lowest = here;
   }
   if (sine > DEM_FLUSH_SINE) {
-    share = share_inside(polygon, m, edges, m_edges, gradient, tie, fade);
+    share = share_inside(polygon, m, edges, m_edges, gradient, sine, tie, fade);
     m = keep_strip(polygon, m, gradient, sine, strip, &weight);
     m = without_ties(polygon, m, tie);
   }
@@ -643,7 +674,8 @@ static long long touch_at_edges(const dem_solids *s, long long a, long long b, d
       }
       if (largest >= max_gap) return 0;
     }
-  const crossing best = find_crossing(s, a, b, largest);
+  /* a crossing at the end of an edge has the direction of the face to second order: the face goes first */
+  const crossing best = find_crossing(s, a, b, largest + tie);
   if (best.separation >= max_gap || best.separation <= -max_depth) return 0;
   if (best.a[0] >= 0) {
     const double share = fmin(best.inside / (DEM_FADE_PER_GAP * max_gap), 1.0);

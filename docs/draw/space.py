@@ -11,12 +11,21 @@ veering.png: direction in which a block slides, whose dip line is oblique to the
 import numpy as np
 from command_line import output_folder
 from matplotlib import pyplot as plt
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from PIL import Image
 
 from dem_demo.space import SpaceSimulation, Statics, load, parse
 from dem_demo.space.contacts import Surfaces, find_contacts
 from dem_demo.space.drawing import Drawing
-from dem_demo.space.pictures import JOINTS_PULL, ROUGH_COLOUR, STATE_COLOURS, SpacePictures
+from dem_demo.space.pictures import (
+    EDGE_COLOUR,
+    JOINTS_PULL,
+    MARKED_COLOUR,
+    ROUGH_COLOUR,
+    STATE_COLOURS,
+    SpacePictures,
+)
 from dem_demo.space.solids import box, convex_hull
 from dem_demo.space.strength import factor_of_safety
 from jointlaw.support.pyplot import style
@@ -29,13 +38,25 @@ def draw_scene(axes, name):
     unstable = statics.solve().unstable
     drawing = Drawing(statics, unstable)
     pictures = SpacePictures(drawing, [drawing.pulled_apart(JOINTS_PULL)])
-    pictures.draw(axes, 0)
+    pictures.draw(axes, 0, "pulled apart to show the joints")
     way = "along" if name == "wedge" else "across"
     verdict = "unstable" if unstable.any() else "stable"
     axes.figure.suptitle("")
     axes.set_title(
         f"rough {way} the line of intersection:\nfactor of safety {factor:.2f}, {verdict}"
     )
+
+
+def add_legend(figure):
+    """Add the colours of the blocks and the lines of the rough direction below both wedges."""
+    handles = [
+        Patch(facecolor=STATE_COLOURS[name], edgecolor=EDGE_COLOUR, lw=0.8, label=name)
+        for name in ("fixed", "stable")
+    ]
+    look = {"facecolor": STATE_COLOURS["unstable"], "edgecolor": MARKED_COLOUR, "lw": 2.0}
+    handles.append(Patch(**look, label="unstable"))
+    handles.append(Line2D([], [], color=ROUGH_COLOUR, lw=1.5, label="rough direction"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
 
 
 def draw_slope(path):
@@ -119,9 +140,9 @@ def slide_azimuths(anisotropy):
 def draw_veering(axes):
     """Draw the direction of the way of a slab by the distance that it has slid."""
     for anisotropy, text in (
-        (-0.3, "rougher across it"),
+        (-0.3, "rougher along axis 3"),
         (0.0, "isotropic"),
-        (0.3, "rougher along it"),
+        (0.3, "rougher along axis 2"),
     ):
         distance, azimuth = slide_azimuths(anisotropy)
         seen = distance > 0.1
@@ -137,9 +158,11 @@ def main() -> None:
     """Draw the pictures into the folder of the command line."""
     folder = output_folder(__doc__)
     with style():
-        figure, pair = plt.subplots(1, 2, figsize=(11, 4.4))
+        figure, pair = plt.subplots(1, 2, figsize=(11, 4.9), layout="constrained")
+        figure.get_layout_engine().set(h_pad=0.1)  # inches, above the titles
         for axes, name in zip(pair, ("wedge", "wedge-across"), strict=True):
             draw_scene(axes, name)
+        add_legend(figure)
         figure.savefig(folder / "wedge.png", dpi=110)
         draw_slope(folder / "slope-3d-joints.png")
         figure, axes = plt.subplots(figsize=(7, 3.4))

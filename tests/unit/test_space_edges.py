@@ -61,6 +61,30 @@ def test_the_strip_widens_from_five_to_two_degrees():
     assert areas[5:] == pytest.approx(np.full((3, 2), 4 * STRIP), rel=2e-3)
 
 
+@pytest.mark.parametrize("shift", [0.05, 0.0])
+@pytest.mark.parametrize("roll", [0.0, 0.01])
+@pytest.mark.parametrize("tilt", [3.0, 8.0, 25.0])
+def test_an_edge_on_a_block_with_flush_sides(tilt, roll, shift):
+    """The edge ends at the sides of both blocks, and lies on the face, or along its border. A
+    contact sees the deepest vertex, although edges cross there; a roll (degrees) about the other
+    axis lifts one end."""
+    low = box([1.0, 2.0, 1.0], [0.0, 0.0, -0.5])
+    block = placed(box([1.0, 2.0, 1.5]), [0.0, tilt, 0.0], -2e-4)
+    block = block.moved(
+        np.array([0.5 - shift - block.vertices[block.vertices[:, 2].argmin(), 0], 0, 0])
+    )
+    block = block.rotated(Rotation.from_rotvec([np.radians(roll), 0.0, 0.0]).as_matrix())
+    depth = -block.vertices[:, 2].min()
+    for _, points, _ in both_orders(low, block):
+        assert points.closure.max() == pytest.approx(depth, rel=0.1)
+        touches = points.closure > 0
+        if roll == 0:
+            assert points.area[touches].sum() == pytest.approx(points.area.sum() / 2, rel=1e-6)
+            assert points.area[touches].sum() >= STRIP * 2.0 * (1 - 1e-6)
+        else:
+            assert points.area[touches].sum() > 0.5 * STRIP
+
+
 def test_a_corner_on_a_face():
     """One point of the triangle at the corner touches; it lies at the corner."""
     cube = placed(box([1.0, 1.0, 1.0]), [40.0, 30.0, 0.0], -1e-5)

@@ -248,3 +248,37 @@ def test_faces_at_any_tilt_keep_the_balance_of_energy(tilt, floor_first):
     contact and next to the limits at 2 and 5 degrees, whichever of the block and the floor comes
     first: within 2e-4 until it has passed to its other edge."""
     assert error_of_rocking(tilt, floor_first, 0.12 if tilt == 1.5 else 0.25) < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("tilt", "shift", "floor_first", "end", "allowed"),
+    [
+        (3.0, 0.05, True, 0.1, 1e-4),
+        *(
+            pytest.param(tilt, shift, floor_first, 0.3, allowed, marks=pytest.mark.slow)
+            for floor_first in (True, False)
+            for tilt, shift, allowed in (
+                (1.5, 0.05, 1e-4), (3.0, 0.05, 1e-4), (8.0, 0.05, 1e-4),
+                (1.5, 0.0, 2e-3), (3.0, 0.0, 2e-3),
+            )
+        ),
+    ],
+)  # fmt: skip
+def test_a_block_that_rocks_on_a_block_with_flush_sides(tilt, shift, floor_first, end, allowed):
+    """The ends of its edge lie over the edges of the lower block, where edges cross. The edge lies
+    a shift (m) inside the border of the lower face, or along it, where its contact passes between
+    the planes of both blocks. Until it has passed to its other edge."""
+    law = coulomb(0.9, 1e9, 5e8)
+    blocks = [
+        block("low", box=[0.5, 1.0, 1.0], at=[shift - 0.25, 0.0, -0.5], fixed=True),
+        block("top", corners=tilted([0.5, 1.0, 2.0], tilt, 0.0)),
+    ]
+    text = f"[laws.rock]\n{law}" + "".join(blocks if floor_first else blocks[::-1])
+    sim = SpaceSimulation(parse(f"{text}[run]\nend = {end}\nstep = 2e-4\n{NO_DASHPOTS}"))
+    balance = sim.energy_balance
+    errors = []
+    while sim.time < end:
+        sim.step()
+        errors.append(balance.total - balance.start)
+    assert np.abs(errors).max() < allowed * balance.value["turnover"]
+    assert tilt_of(sim, int(floor_first)) > (0.3 if end < 0.3 else 1.9)

@@ -1,6 +1,6 @@
 """Cost per contact and step in the particle codes LAMMPS and YADE, compared with their own laws.
 
-    python docs/measure/hosts.py lammps FOLDER [--rounds 3] [--steps 40] [--settle 40] [--repeat 2]
+    python docs/measure/hosts.py lammps FOLDER [--rounds 2] [--steps 40] [--settle 40] [--repeat 2]
     python docs/measure/hosts.py lammps-scale FOLDER [--small]
     python docs/measure/hosts.py yade [--contacts 20000] [--runs 60] [--preset jing-replica]
 
@@ -228,7 +228,7 @@ print("RESULT " + json.dumps(results), flush=True)
 """
 
 
-def lammps(folder: Path, rounds=3, steps=40, settle=40, repeat=2):
+def lammps(folder: Path, rounds=2, steps=40, settle=40, repeat=2):
     """ns per contact and step of pair_style jointlaw in a packing, and of LAMMPS' own styles.
 
     Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after

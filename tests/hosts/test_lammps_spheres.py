@@ -240,3 +240,57 @@ def test_spheres_that_meet_have_no_bond(plugin):
     assert (force[:61] < 0.0).any()
     assert opening[-1] > 1e-5
     assert (force <= 0.0).all()
+
+
+CROWD = (
+    HEAD
+    + """boundary f f f
+region box block -0.3 0.3 -0.3 0.3 -0.3 0.3
+create_box 2 box
+{atoms}set type 1 diameter 0.02 density 2600
+set type 2 diameter 0.016 density 2600
+plugin load ./jointlawplugin.so
+pair_style jointlaw opening 1e-3 damping 0.1
+pair_coeff 1 1 rock.jlaw
+pair_coeff 1 2 worn.jlaw
+pair_coeff 2 2 NULL
+neighbor 0.002 bin
+timestep 4e-7
+fix 1 all nve/sphere
+dump 1 all custom 10 out id x y z vx vy vz omegax omegay omegaz fx fy fz
+dump_modify 1 sort id format float %.17g
+run 400
+"""
+)
+
+
+def crowd(folder, pairs, processors=1):
+    """Places, velocities, spins and forces (frames, pairs, 2, 12) of spheres that collide in pairs.
+
+    A pair has its own place, speed and distance, and every third one has spheres of two sizes.
+    """
+    atoms = []
+    for tag, pair in enumerate(pairs):
+        x = X + 0.07 * (np.array([pair % 5, pair // 5 % 5, pair // 25]) - 2)
+        two_sizes = pair % 3 == 0
+        farther = 2e-6 * (pair % 7) - (2e-3 if two_sizes else 0.0)
+        x[1] += farther * APART / np.linalg.norm(APART)
+        v = V * (1.0 + 0.05 * (pair % 11))
+        for k in (0, 1):
+            lines = ATOM.format(2 * tag + 1 + k, *x[k].tolist(), *v[k].tolist(), *W[k].tolist())
+            smaller = two_sizes and k == 1
+            atoms.append(lines.replace("create_atoms 1", "create_atoms 2") if smaller else lines)
+    run(folder, CROWD.format(atoms="".join(atoms)), processors)
+    frames = dumped(folder / "out")
+    return frames[..., 1:].reshape(len(frames), len(pairs), 2, 12)
+
+
+def test_pairs_among_many_move_as_alone(plugin):
+    """To the bit: joints that begin and end at different steps are advanced in groups of many."""
+    together = crowd(plugin, range(125))
+    in_contact = together[:, :, 0, 9:].any(axis=2)
+    assert in_contact.sum(axis=1).max() > 100
+    assert len({tuple(of_pair) for of_pair in in_contact.T}) > 10  # other steps for other pairs
+    assert (crowd(plugin, range(125), processors=2) == together).all()
+    for pair in (0, 63, 124):
+        assert (crowd(plugin, [pair])[:, 0] == together[:, pair]).all(), pair

@@ -399,7 +399,7 @@ def test_peak_and_residual_of_bond_and_friction(name, toughness):
     slip = 40.0 * unbonded.closure_range
     for stress in (0.3e6, 1e6, 3e6, 10e6, 30e6):
         friction, bonded = (
-            jl.direct_shear(law.joint(), slip, stress, steps=200).shear_stress
+            jl.direct_shear(law.joint(), slip, stress, steps=400).shear_stress
             for law in (unbonded, replace(unbonded, bond=bond))
         )
         tan_phi = friction.max() / stress

@@ -197,6 +197,10 @@ def test_picture_of_a_fit(fit):
     middle = law[50]
     inside = band[np.isclose(band[:, 0] * 1e-6, middle[0])][:, 1] * 1e6
     assert inside.min() < middle[1] < inside.max()
+    for x in law[10::30, 0]:
+        edges = band[np.isclose(band[:, 0], 1e6 * x, rtol=1e-12)][:, 1]
+        limits = np.concatenate(result.band(np.array([x])))
+        np.testing.assert_allclose([edges.min(), edges.max()], 1e-6 * limits, rtol=1e-9)
     for axis, name, sense in ((shearing, "shear_stress", 1), (opening, "opening", 1)):
         factor = unit_factor(axis.get_ylabel())
         points = [line for line in axis.lines if line.get_marker() == "o" and len(line.get_xdata())]
@@ -214,9 +218,15 @@ def test_picture_of_a_fit(fit):
         for band, curve in zip(bands, curves, strict=True):  # each band is about its curve
             x, y = curve.get_data()
             assert [band[:, 0].min(), band[:, 0].max()] == pytest.approx([x.min(), x.max()])
+            factor = unit_factor(axis.get_ylabel())
+            test = (fitted, predicted)[curves.index(curve)]
+            low, high = result.shear_band(test)[0 if name == "shear_stress" else 1]
+            assert len(low) == len(x)
             for i in range(0, len(x), max(len(x) // 7, 1)):
                 at = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
                 assert at.min() - 1e-9 <= y[i] <= at.max() + 1e-9
+                assert factor * at.min() <= low[i] + 1e-9 * abs(low[i])
+                assert factor * at.max() >= high[i] - 1e-9 * abs(high[i])
     # the law's own curve: a joint of the fitted law, sheared as the test was
     own = result.law.joint()
     jl.direct_shear(own, 0.0, normal=1e6, steps=40)

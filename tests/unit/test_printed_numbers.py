@@ -15,13 +15,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import jointlaw as jl
 from dem_demo.cli import main as run_blocks
+from dem_demo.contact.joints import tabulate_first_loading
 from dem_demo.studies import ablate
 from jointlaw.accuracy import slip as slip_tests
 from jointlaw.accuracy import suite
-from jointlaw.calibration import datasets, field
+from jointlaw.calibration import datasets, field, noise
 from jointlaw.calibration.aperture import FlowConditions, FlowFit, FlowTest
 from jointlaw.calibration.fit import Fit
 from jointlaw.calibration.meaning import describe
@@ -34,6 +36,7 @@ from jointlaw.parameters import rock
 from jointlaw.parameters.about import About
 from jointlaw.parameters.aperture import Aperture
 from jointlaw.surface.faces import CompositeSurface
+from jointlaw.tables.joint_table import JointTable
 
 SI = {
     "m": 1.0, "mm": 1e-3, "um": 1e-6, "m2": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa/m": 1e9,
@@ -314,11 +317,11 @@ def test_notes_and_messages_of_shear_files():
     np.testing.assert_allclose(mean, [0.0, 2.5e-3])
     assert quantities(note) == [pytest.approx(1e-3)]
     readings = {
-        "shear": np.array([0.0, 1e-3, 2e-3, 3e-3, 0.0, 1e-3]),
+        "shear": np.array([0.0, 1e-3, 2e-3, 3e-3, 0.2e-3, 1e-3]),
         "stress": np.array([0.0, 1e6, 2e6, 2e6, 0.0, 1e6]),
     }
     table = SimpleNamespace(name="shear.csv")
-    with pytest.raises(ValueError, match="returns from 3 to 0 mm"):
+    with pytest.raises(ValueError, match=r"returns from 3 to 0\.2 mm"):
         datasets._require_one_test(readings, [*range(2, 8)], table)
 
 
@@ -489,3 +492,47 @@ def test_plausible_values_of_rock(name):
             rock.require_rock({name: value})
         bounds = rf"({NUMBER}) to ({NUMBER})" + "".join(f" {re.escape(unit)}" for unit in units)
         assert re.search(bounds, str(error.value)), str(error.value)
+
+
+# ------------------------------------------------------------------------- curves of blocks, noise
+
+
+def test_curves_of_blocks_end_beyond_the_strength_of_rock():
+    """0.5 GPa is the strength of the strongest rock; far beyond it cells of the curve are wide."""
+    stress = tabulate_first_loading(LAW)["stress"]
+    assert 1e9 <= stress[-1] <= 5e9
+    assert (np.diff(stress) > 0).all()
+
+
+@pytest.mark.parametrize(("source", "factor"), [("load cell", 30.0), ("displacement", 4.0)])
+def test_range_of_the_levels_of_noise(source, factor):
+    """95 % of a normal density of the logarithm: from 1/4 to 4 times, of a load cell 1/30 to 30."""
+    assert noise._level_sd(source) == pytest.approx(np.log(factor) / norm.ppf(0.975), rel=1e-3)
+
+
+# ----------------------------------------------------------------------------------- joint tables
+
+
+def test_columns_of_a_table_file(tmp_path):
+    """Each column by its documented name, with azimuths in degrees at the end of the name."""
+    n, p = 4, 6
+    by_row = {name: np.arange(n) + 10.0 * k for k, name in enumerate(("un", "sn", "sec", "tan"))}
+    values = {
+        name: 100.0 * (k + 1) + np.arange(n * p).reshape(n, p)
+        for k, name in enumerate(("kt", "mu", "mob", "dil"))
+    }
+    table = JointTable(
+        by_row["un"], by_row["sn"], by_row["sec"], by_row["tan"], np.pi / p * np.arange(p),
+        values["kt"], values["mu"], values["mob"], values["dil"], {},
+    )  # fmt: skip
+    table.save(tmp_path / "joint.txt")
+    written = np.genfromtxt(tmp_path / "joint.txt", names=True)
+    expected = {
+        "un": by_row["un"], "sn": by_row["sn"], "kn_secant": by_row["sec"],
+        "kn_tangent": by_row["tan"], "mu": values["mu"].mean(axis=1),
+    }  # fmt: skip
+    for name, columns in values.items():
+        expected |= {f"{name}_{30 * k:03d}": column for k, column in enumerate(columns.T)}
+    assert {*written.dtype.names} == {*expected}
+    for name, column in expected.items():
+        np.testing.assert_allclose(written[name], column, err_msg=name)

@@ -2,6 +2,7 @@
 and curves."""
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,20 @@ def length_unit(length: float) -> tuple[float, str]:
     if length < 1e-4:
         return 1e6, "µm"
     return (1e3, "mm") if length < 0.1 else (1.0, "m")
+
+
+def write_animation(path: Path, axes: Axes, count: int, draw: Callable[[int], None]) -> None:
+    """Write a GIF of `count` frames, or of MAX_FRAMES of them, at a constant rate.
+
+    draw: draws the frame of a number into the axes, which are cleared before.
+    """
+    frames = np.linspace(0, count - 1, min(count, MAX_FRAMES)).round().astype(int).tolist()
+    writer = PillowWriter(FRAME_RATE)
+    with writer.saving(axes.figure, path, ANIMATION_DPI):
+        for i in track(frames, "animation", len(frames)):
+            axes.clear()
+            draw(i)
+            writer.grab_frame()
 
 
 class Pictures:
@@ -272,15 +287,8 @@ class Pictures:
     @style()
     def animation(self, path: Path) -> None:
         """Draw the whole run as GIF, at a constant rate of model time."""
-        count = len(self.record.times)
-        frames = np.linspace(0, count - 1, min(count, MAX_FRAMES)).round().astype(int).tolist()
-        figure, axes = self.figure()
-        writer = PillowWriter(FRAME_RATE)
-        with writer.saving(figure, path, ANIMATION_DPI):
-            for i in track(frames, "animation", len(frames)):
-                axes.clear()
-                self.draw(axes, i)
-                writer.grab_frame()
+        _, axes = self.figure()
+        write_animation(path, axes, len(self.record.times), lambda i: self.draw(axes, i))
 
     @style()
     def estimate_time(self, frames: int) -> float:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
@@ -19,18 +18,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from jointlaw.support.progress import track
 from jointlaw.support.pyplot import escape_math, style, written
 
 from ..output.pictures import (
-    ANIMATION_DPI,
     DISPLACEMENT_COLOURS,
-    FRAME_RATE,
     MARKED_COLOUR,
     MAX_COLOUR_RATIO,
-    MAX_FRAMES,
     MIN_DISTANCE,
     length_unit,
+    write_animation,
 )
 from ..output.record import FAILURE_DISPLACEMENT
 from .drawing import Drawing, Motion
@@ -362,12 +358,9 @@ class SpacePictures:
     @style()
     def animation(self, path: Path, times: Sequence[float]) -> None:
         """Draw all frames as GIF, at a constant rate. times: of the frames (s)."""
-        count = len(self.motions)
-        frames = np.linspace(0, count - 1, min(count, MAX_FRAMES)).round().astype(int).tolist()
-        figure, axes = self.figure()
-        writer = PillowWriter(FRAME_RATE)
-        with writer.saving(figure, path, ANIMATION_DPI):
-            for i in track(frames, "animation", len(frames)):
-                axes.clear()
-                self.draw(axes, i, f"t = {times[i]:.2f} s", ANIMATION_PIXELS)
-                writer.grab_frame()
+        _, axes = self.figure()
+
+        def draw(i: int) -> None:
+            self.draw(axes, i, f"t = {times[i]:.2f} s", ANIMATION_PIXELS)
+
+        write_animation(path, axes, len(self.motions), draw)

@@ -178,6 +178,7 @@ PARTS = {
         is_timed=True,
     ),
     "blocks-cost": Part("docs/measure/blocks.py step-cost", page="blocks.md", is_timed=True),
+    "seam-cost": Part("docs/measure/blocks.py seam-cost", page="blocks.md", is_timed=True),
     "space-cost": Part("docs/measure/space.py cost", page="space.md", is_timed=True),
     "space-step-cost": Part("docs/measure/space.py step-cost", page="space.md", is_timed=True),
     "heap": Part("docs/measure/blocks.py heap FOLDER", quoted_in="blocks.md", is_timed=True),

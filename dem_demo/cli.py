@@ -194,8 +194,7 @@ def _print_law_warnings(scene: Scene | SpaceScene) -> None:
 
 def _run_simulation(options: argparse.Namespace, sim: Simulation) -> None:
     """Run a simulation to its end, and write its files."""
-    has_pictures = options.format is not None and isinstance(sim.scene, Scene)
-    _describe(sim, options.until, has_pictures)
+    _describe(sim, options.until, options.format is not None)
     dt = sim.dt
     vtk = options.vtk or (isinstance(sim.scene, SpaceScene) and _replaces_pictures(options))
     record, summary = run(sim, options.out, options.until, options.format, vtk)
@@ -390,7 +389,8 @@ def _print_limit_analysis(scene: Scene) -> None:
 
 
 def _print_estimate(sim: Simulation, steps: int, until: float | None, with_pictures: bool) -> None:
-    """Print the estimated time of a run, with its pictures if there are any.
+    """Print the estimated time of a run, with its pictures if there are any; in space the text says
+    that they are left out.
 
     Nothing is printed for a run without steps, or if the first steps of a copy end with an error.
     """
@@ -398,7 +398,9 @@ def _print_estimate(sim: Simulation, steps: int, until: float | None, with_pictu
     if not step_time or not steps:
         return
     text = f"estimated {_format_duration(step_time * steps)}"
-    if with_pictures:
+    if with_pictures and isinstance(sim.scene, SpaceScene):
+        text += ", without the pictures"
+    elif with_pictures:
         end = sim.scene.run.end if until is None else until
         frames = 1 + round((end - sim.time) / sim.scene.run.record)
         drawing_time = Pictures(RunRecord(sim)).estimate_time(frames)

@@ -9,7 +9,7 @@ tables of costs.
 
 Without a name all parts are made. Parts that measure no time run two at a time, on one thread each;
 parts that measure times come last, one by one: let no other program run meanwhile. Some parts need
-an hour, others YADE, LAMMPS or CuPy. A part that fails does not stop the others.
+an hour, others YADE, LAMMPS, LMGC90 or CuPy. A part that fails does not stop the others.
 """
 
 import os
@@ -181,6 +181,8 @@ PARTS = {
     "seam-cost": Part("docs/measure/blocks.py seam-cost", page="blocks.md", is_timed=True),
     "space-cost": Part("docs/measure/space.py cost", page="space.md", is_timed=True),
     "space-step-cost": Part("docs/measure/space.py step-cost", page="space.md", is_timed=True),
+    "space-incline": Part("docs/measure/lmgc90.py incline", page="space.md", is_timed=True),
+    "space-walls": Part("docs/measure/lmgc90.py walls", page="space.md", is_timed=True),
     "heap": Part("docs/measure/blocks.py heap FOLDER", quoted_in="blocks.md", is_timed=True),
     "yade": Part("docs/measure/hosts.py yade", page="particles.md", is_timed=True),
     "lammps": Part("docs/measure/hosts.py lammps FOLDER", page="particles.md", is_timed=True),

@@ -6,13 +6,14 @@ import re
 import shlex
 
 import pytest
-from scene_text import PLAIN, block, on_base
+from scene_text import PLAIN, block, coulomb, on_base
 
 import jointlaw as jl
 from dem_demo import cli
 from dem_demo.cli import COMMANDS, main
 from dem_demo.dynamics import relaxation
 from dem_demo.scene import shipped
+from dem_demo.space import SpaceSimulation, parse
 
 SLAB = on_base(PLAIN, [1.0, 0.3], 10.0, end=0.01)
 
@@ -91,6 +92,16 @@ def test_the_estimate_counts_figures_and_animation(tmp_path, capsys):
         assert main(["scene.toml", "--force", "--out", "out", *option]) == 0
         (line,) = re.findall(r"^estimated .*$", capsys.readouterr().out, re.MULTILINE)
         assert ("s for figures and animation" in line) == expected
+
+
+@pytest.mark.parametrize("with_pictures", [True, False])
+def test_the_estimate_in_space_says_that_it_leaves_out_the_pictures(with_pictures, capsys):
+    text = f"[laws.rock]\n{coulomb()}" + block("base", box=[2, 2, 1], fixed=True)
+    text += block("slab", box=[1, 1, 0.5], at=[0, 0, 0.75])
+    sim = SpaceSimulation(parse(f"{text}[run]\nend = 0.1\n"))
+    cli._print_estimate(sim, 100, None, with_pictures)
+    (line,) = re.findall(r"^estimated .*$", capsys.readouterr().out, re.MULTILINE)
+    assert line.endswith(" s, without the pictures") == with_pictures
 
 
 @pytest.mark.parametrize(

@@ -230,9 +230,11 @@ def test_297_bricks_stand(law):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [WALL, ROCK], ids=["coulomb", "rough"])
-def test_dropped_bricks_keep_the_balance_of_energy(law):
-    """A wall of 27 bricks falls by 1 mm on the ground, and rests there half a second later."""
-    sim = wall(5, 6, law, "end = 0.3\nsettle = false\n", gap=1e-3)
+@pytest.mark.parametrize(("wide", "high", "moving"), [(5, 6, 0.02), (17, 18, 0.1)])
+def test_dropped_bricks_keep_the_balance_of_energy(wide, high, moving, law):
+    """Walls of 27 and 297 bricks fall by 1 mm on the ground. After 0.3 s the kinetic energy is at
+    most a share of the energy of the dashpots; the higher wall still sways on its joints."""
+    sim = wall(wide, high, law, "end = 0.3\nsettle = false\n", gap=1e-3)
     start = sim.blocks.motion[:3].copy()
     errors = []
     while sim.time < 0.3:
@@ -241,7 +243,7 @@ def test_dropped_bricks_keep_the_balance_of_energy(law):
     assert np.abs(errors).max() < 3e-4
     fallen = sim.blocks.motion[2] - start[2]
     assert (fallen[1:] < -9e-4).all()
-    assert sim.energy_balance.value["kinetic"] < 0.02 * sim.energy_balance.value["dashpots"]
+    assert sim.energy_balance.value["kinetic"] < moving * sim.energy_balance.value["dashpots"]
 
 
 def driven(drive, end, load=(0.0, 0.0, 0.0), more="", tilt=0.0):

@@ -356,6 +356,18 @@ def test_a_restored_simulation_is_the_saved_one(scene, simulations, tmp_path):
 
 
 @pytest.mark.parametrize("scene", SCENES)
+def test_single_numbers_are_restored(scene, simulations):
+    """A number that is as in a new simulation too: the saved state has another one."""
+    sim, _ = simulations[scene]
+    state = sim.state()
+    names = [name for name in sim.state_paths if state[name].shape == ()]
+    changed = {name: state[name] + 0.5 for name in names if state[name].dtype.kind == "f"}
+    assert "water_time" in changed
+    restored = new_simulation(sim.scene, state | changed).state()
+    assert {name: restored[name] for name in changed} == changed
+
+
+@pytest.mark.parametrize("scene", SCENES)
 def test_what_is_not_saved_is_overwritten_before_it_is_read(scene, simulations, expected, tmp_path):
     sim, steps = simulations[scene]
 

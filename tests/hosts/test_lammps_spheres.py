@@ -264,33 +264,37 @@ run 400
 )
 
 
-def crowd(folder, pairs, processors=1):
-    """Places, velocities, spins and forces (frames, pairs, 2, 12) of spheres that collide in pairs.
+def crowd(folder, clusters, processors=1):
+    """Places, velocities, spins and forces (frames, clusters, 3, 12) of clusters of three spheres.
 
-    A pair has its own place, speed and distance, and every third one has spheres of two sizes.
+    Two spheres collide with the first one. A cluster has its own place, speed and distances, and in
+    every third one the second sphere is smaller.
     """
     atoms = []
-    for tag, pair in enumerate(pairs):
-        x = X + 0.07 * (np.array([pair % 5, pair // 5 % 5, pair // 25]) - 2)
-        two_sizes = pair % 3 == 0
-        farther = 2e-6 * (pair % 7) - (2e-3 if two_sizes else 0.0)
-        x[1] += farther * APART / np.linalg.norm(APART)
-        v = V * (1.0 + 0.05 * (pair % 11))
-        for k in (0, 1):
-            lines = ATOM.format(2 * tag + 1 + k, *x[k].tolist(), *v[k].tolist(), *W[k].tolist())
+    direction = APART / np.linalg.norm(APART)
+    for place, cluster in enumerate(clusters):
+        two_sizes = cluster % 3 == 0
+        first = X[0] + 0.07 * (np.array([cluster % 5, cluster // 5 % 5, cluster // 25]) - 2)
+        distance = 2 * R + 2e-6 * (cluster % 7) - (2e-3 if two_sizes else 0.0)
+        other_distance = 2 * R + 2e-6 * (cluster % 4)
+        x = [first, first + distance * direction, first - other_distance * direction]
+        v = np.array([V[0], V[1], 2 * V[0] - V[1]]) * (1.0 + 0.05 * (cluster % 11))
+        w = [*W, -W[1]]
+        for k in range(3):
+            lines = ATOM.format(3 * place + 1 + k, *x[k].tolist(), *v[k].tolist(), *w[k].tolist())
             smaller = two_sizes and k == 1
             atoms.append(lines.replace("create_atoms 1", "create_atoms 2") if smaller else lines)
     run(folder, CROWD.format(atoms="".join(atoms)), processors)
     frames = dumped(folder / "out")
-    return frames[..., 1:].reshape(len(frames), len(pairs), 2, 12)
+    return frames[..., 1:].reshape(len(frames), len(clusters), 3, 12)
 
 
-def test_pairs_among_many_move_as_alone(plugin):
+def test_spheres_among_many_move_as_alone(plugin):
     """To the bit: joints that begin and end at different steps are advanced in groups of many."""
     together = crowd(plugin, range(125))
-    in_contact = together[:, :, 0, 9:].any(axis=2)
-    assert in_contact.sum(axis=1).max() > 100
-    assert len({tuple(of_pair) for of_pair in in_contact.T}) > 10  # other steps for other pairs
+    in_contact = together[:, :, 1:, 9:].any(axis=3)
+    assert in_contact.sum(axis=(1, 2)).max() > 200
+    assert len({tuple(contact) for contact in in_contact.reshape(len(together), -1).T}) > 4
     assert (crowd(plugin, range(125), processors=2) == together).all()
-    for pair in (0, 63, 124):
-        assert (crowd(plugin, [pair])[:, 0] == together[:, pair]).all(), pair
+    for cluster in (0, 31, 62, 93, 124):
+        assert (crowd(plugin, [cluster])[:, 0] == together[:, cluster]).all(), cluster

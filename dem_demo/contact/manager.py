@@ -196,7 +196,8 @@ class ContactManager:
         own_edges = edge_pairs[rows].ravel()  # the shared edge of each candidate is one of them
         is_own_edge = np.zeros(len(self.outlines.block), bool)
         is_own_edge[own_edges] = True
-        loaded = np.flatnonzero(bears_load & is_own_edge[edge_pairs].any(axis=1))
+        first, second = edge_pairs.T
+        loaded = np.flatnonzero(bears_load & (is_own_edge[first] | is_own_edge[second]))
         loaded_edges = edge_pairs[loaded].ravel()
         order = np.argsort(loaded_edges, kind="stable")
         first, last = (

@@ -572,7 +572,8 @@ class Simulation:
         manager = self.manager
         joints = self.joints
         edge_pairs = self.contacts.edge_pairs
-        has_other_edges = (edge_pairs != manager.face_pairs).any(axis=1)
+        first_is_other, second_is_other = (edge_pairs != manager.face_pairs).T
+        has_other_edges = first_is_other | second_is_other
         stored_energy = joints.stored_energy
         rows = np.flatnonzero((stored_energy == 0) & (is_new | has_other_edges))
         rows = rows[(joints.traction[rows] == 0).all(axis=1)]

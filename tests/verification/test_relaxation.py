@@ -2,10 +2,12 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scene_text import block, coulomb, lines, on_base
+from scipy.sparse import csc_array
 
 import jointlaw as jl
 from dem_demo import Simulation, load, parse
@@ -13,12 +15,14 @@ from dem_demo.contact import ContactManager, Joints
 from dem_demo.dynamics import relaxation
 from dem_demo.dynamics.blocks import Blocks
 from dem_demo.dynamics.equilibrium import (
+    _search_as_drawn,
     create_joints,
+    drawn_blocks,
     equilibrium_displacements,
     static_system,
 )
 from dem_demo.dynamics.relaxation import Relaxation, Verdict, is_plain_friction
-from dem_demo.dynamics.search import EquilibriumSearch
+from dem_demo.dynamics.search import EquilibriumSearch, factorise
 from dem_demo.studies.strength import alone, factor_of_safety, weakened
 
 
@@ -44,6 +48,56 @@ def test_compiled_forces_are_the_assembled_ones(name, kernel, monkeypatch):
     expected = search.expand(search._unbalanced(y)[0])
     result = search._relaxation().unbalanced(search.expand(y))
     assert result == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
+
+
+def test_assembled_stiffness_is_the_derivative_of_the_forces():
+    """Along a random motion, by central differences; some joints are open, others slide."""
+    search = search_of(weakened(load("wet-slope").excavated, 1.3))
+    y = search.stick_predictor()
+    rng = np.random.default_rng(0)
+    direction = rng.standard_normal(len(y)) * np.abs(y).max()
+    stiffness = search._unbalanced(y)[1]
+    assert 0 < np.count_nonzero(stiffness.joints.any(axis=(1, 2))) < search.k
+    step = 1e-7
+    ends = [search._unbalanced(y + sign * step * direction)[0] for sign in (-1.0, 1.0)]
+    expected = (ends[0] - ends[1]) / (2 * step)
+    result = search._assemble_stiffness(stiffness) @ direction
+    assert result == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+
+
+def test_factorisation_keeps_its_accuracy_without_entries_on_the_diagonal():
+    """Entries of the diagonal that vanish or are tiny cannot be pivots; a singular matrix has no
+    factors."""
+    rng = np.random.default_rng(1)
+    m = 40
+    near = np.abs(np.subtract.outer(np.arange(m), np.arange(m))) <= 3
+    matrix = rng.standard_normal((m, m)) * near
+    np.fill_diagonal(matrix, rng.choice([0.0, 1e-14, 1.0], m))
+    exact = rng.standard_normal(m)
+    result = factorise(csc_array(matrix)).solve(matrix @ exact)
+    assert result == pytest.approx(exact, abs=1e-11 * np.linalg.cond(matrix))
+    matrix[3] = 0.0
+    assert factorise(csc_array(matrix)) is None
+
+
+def test_scenes_that_differ_in_their_laws_share_blocks_and_contacts():
+    """In-situ stress closes the joints of each law by its own closure, so nothing of one scene may
+    be left for the next."""
+    text = on_base(coulomb(0.7), [3.0, 0.75], 10.0)
+    stress = lines(stress=[0.0, 1e6, 0.0])
+    scene = parse(text + "[in_situ]\n" + stress)
+    drawn = drawn_blocks(scene)
+    starts = []
+    for factor in (1.0, 2.0):
+        law = scene.laws["rock"]
+        stiffer = replace(law, normal_stiffness=factor * law.normal_stiffness)
+        changed = replace(scene, laws={"rock": stiffer})
+        shared, _ = _search_as_drawn(changed, None, drawn)
+        single = search_of(changed)
+        for name in ("start", "force", "area"):
+            assert np.array_equal(getattr(shared, name), getattr(single, name)), name
+        starts.append(shared.start)
+    assert np.abs(starts[0] - starts[1]).max() > 0.4 * np.abs(starts[0]).max()
 
 
 def test_an_error_of_a_law_in_python_passes_through_the_compiled_iterations(monkeypatch):

@@ -30,7 +30,7 @@ DENSITY = 2600.0  # kg/m3
 LMGC90_STEP = 1e-3  # s, as in its own examples of masonry
 ANGLES = (30.96, 30.97, 31.5, 32.0, 35.0)  # degrees; atan(0.6) is 30.964
 SLIDING_TIME = 0.5  # s
-WALLS = [(5, 6), (17, 18)]  # bricks of the longest row, and rows
+WALLS = [(5, 6), (17, 18), (32, 32)]  # bricks of the longest row, and rows
 WALL_TIME = 0.02  # s
 
 

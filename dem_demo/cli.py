@@ -249,14 +249,18 @@ def _space_picture_format(options: argparse.Namespace) -> str | None:
     return options.format
 
 
+def _free_blocks(count: int) -> str:
+    """A number of free blocks in words."""
+    return "1 free block" if count == 1 else f"{count} free blocks"
+
+
 def _describe_in_space(statics: Statics, result: Equilibrium) -> None:
     """Print size, rocks and verdict of a scene in space."""
     scene = statics.scene
     contacts = f"{space_output.count_contacts(statics)} contacts"
     points = f"{len(statics.points.area)} contact points"
     count = int(statics.is_free.sum())
-    blocks = "1 free block" if count == 1 else f"{count} free blocks"
-    print(f"{scene.title}: {blocks}, {contacts}, {points}")
+    print(f"{scene.title}: {_free_blocks(count)}, {contacts}, {points}")
     _print_rocks(scene)
     if statics.untouched.any():
         untouched = format_blocks(list_blocks(scene, statics.untouched))
@@ -333,7 +337,7 @@ def _describe(sim: Simulation, until: float | None = None, with_pictures: bool =
     limit = sim.limit.current
     steps = steps_to(sim, until)
     moving = sum(not block.fixed for block in scene.blocks)
-    print(f"{scene.title}: {moving} moving blocks, {sim.joints.n} contact points")
+    print(f"{scene.title}: {_free_blocks(moving)}, {sim.joints.n} contact points")
     reason = ""
     if sim.fraction_reason:
         reason = f"; fraction {dt / limit:.2g}, because {sim.fraction_reason}"

@@ -584,6 +584,7 @@ class Simulation:
         if not len(rows):
             return
         manager.face_pairs[rows] = edge_pairs[rows]
+        has_other_laws = (manager.law[rows] != manager.law[sources]).any()
         manager.law[rows] = manager.law[sources]
         manager.closure_offset[rows] = manager.closure_offset[sources]
         has_new_arrays = joints.continue_joints(rows, sources)
@@ -591,8 +592,8 @@ class Simulation:
         balance.booked_dissipation[rows] = balance.booked_dissipation[sources]
         if has_new_arrays:
             self.bind()
-        # laws have water pressures
-        balance.change_loads(self.blocks, self._apply_loads(), self.dt)
+        if has_other_laws:  # laws have water pressures
+            balance.change_loads(self.blocks, self._apply_loads(), self.dt)
 
     def _transfer_joints(self) -> None:
         """Update joints and energies of contacts whose corners went on to other edges.

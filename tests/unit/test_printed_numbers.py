@@ -20,7 +20,7 @@ from scipy.stats import norm
 import jointlaw as jl
 from dem_demo.cli import main as run_blocks
 from dem_demo.contact.joints import tabulate_first_loading
-from dem_demo.studies import ablate
+from dem_demo.studies import ablate, compare
 from jointlaw.accuracy import slip as slip_tests
 from jointlaw.accuracy import suite
 from jointlaw.calibration import datasets, field, noise
@@ -383,8 +383,6 @@ def test_angles_of_the_accuracy_suite():
 
 
 def test_laws_of_a_comparison_are_printed_in_degrees_and_millimetres(monkeypatch, capsys):
-    from dem_demo.studies import compare
-
     law = jl.CoulombLaw(
         friction=np.tan(np.radians(40)), residual_friction=np.tan(np.radians(30)), weakening=2.5e-3,
         normal_stiffness=1e9, shear_stiffness=1e9,
@@ -400,6 +398,12 @@ def test_laws_of_a_comparison_are_printed_in_degrees_and_millimetres(monkeypatch
     run_blocks(["compare", "slope"])
     line = capsys.readouterr().out.splitlines()[0]
     assert "40.0 degrees at the peak, 30.0 after 2.5 mm" in line
+
+
+def test_row_of_a_comparison(monkeypatch):
+    monkeypatch.setattr(compare, "outcomes", lambda record: [{"state": "failed"}])
+    row = compare._row(SimpleNamespace(times=[0.0, 1.5]), "a message")
+    assert row == {"state": "failed", "time_s": 1.5, "stopped": "a message"}
 
 
 def test_results_of_an_ablation(tmp_path):

@@ -8,6 +8,7 @@ Each block alone gives a cheap bound. The eigenvalues of the whole scene are
 computed only where the bound does not suffice, or falls.
 """
 
+import math
 from contextlib import suppress
 
 import numpy as np
@@ -98,7 +99,10 @@ class TimeStepLimit:
                 "smaller step"
             )
         headroom = allowed / dt
-        growth = min(max(MAX_STIFFNESS_GROWTH, 0.5 * headroom), headroom**2)
+        if math.isinf(headroom):  # no joint is stiff: the first one that closes is checked
+            growth = MAX_STIFFNESS_GROWTH
+        else:
+            growth = min(max(MAX_STIFFNESS_GROWTH, 0.5 * headroom), headroom**2)
         self.checked_stiffness = growth * self.checked_stiffness
 
 

@@ -46,7 +46,9 @@ class BlockOnPlane:
         self.rows = ContactRows.zeros(n_points, dim=3, dof=6, n_keys=1)
         self.rows.block_b[:] = 1
         self.rows.area[:] = SIZE[0] * SIZE[1] / 4
-        self.joints = Joints(SimpleNamespace(laws={"rock": law}, reduction=1.0))
+        self.joints = Joints(
+            SimpleNamespace(laws={"rock": law}, reduction=1.0, gravity=np.zeros(3))
+        )
         zero = np.zeros(n_points, int)
         self.joints.rearrange(zero - 1, zero, np.stack([zero, zero], axis=1))
         self.balance = EnergyBalance(2, dof=6)

@@ -9,6 +9,7 @@ import csv
 import json
 import math
 import re
+from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 from types import SimpleNamespace
@@ -36,6 +37,7 @@ from jointlaw.parameters import rock
 from jointlaw.parameters.about import About
 from jointlaw.parameters.aperture import Aperture
 from jointlaw.surface.faces import CompositeSurface
+from jointlaw.tables import tabulate
 from jointlaw.tables.joint_table import JointTable
 
 SI = {
@@ -406,6 +408,19 @@ def test_row_of_a_comparison(monkeypatch):
     assert row == {"state": "failed", "time_s": 1.5, "stopped": "a message"}
 
 
+def test_mean_stresses_of_a_comparison():
+    """Each closed joint of a law has the weight of its force; 100 kPa without closed joints."""
+    joints = {
+        "law": np.array([0, 0, 0, 1, 2]),
+        "normal_stress_Pa": np.array([1e5, 3e5, -2e4, 4e5, 0.0]),
+        "length_m": np.array([2.0, 1.0, 7.0, 0.3, 5.0]),
+    }
+    scene = SimpleNamespace(laws=dict.fromkeys(("rough", "smooth", "open")))
+    means = compare._mean_stresses(SimpleNamespace(joints=[joints], scene=scene))
+    rough = (1e5 * 2e5 + 3e5 * 3e5) / (2e5 + 3e5)
+    np.testing.assert_allclose(means, [rough, 4e5, 1e5])
+
+
 def test_results_of_an_ablation(tmp_path):
     scene = SimpleNamespace(
         shear=[(0, 1)], blocks=[SimpleNamespace(name="slab")], rocks=["slab"], title="whole"
@@ -515,6 +530,20 @@ def test_range_of_the_levels_of_noise(source, factor):
 
 
 # ----------------------------------------------------------------------------------- joint tables
+
+
+def test_friction_angle_error_of_a_table_is_in_degrees(monkeypatch):
+    """The friction at the end of shear is 0.6 at the resolution of the law, and 0.5 at the fine
+    one."""
+
+    def known_friction(law, u, psi, limit, steps):
+        ratio = 0.6 if law.resolution == LAW.resolution else 0.5
+        return np.broadcast_to(np.reshape([0.9, ratio, 0.1], (3, 1, 1)), (3, len(u), len(psi)))
+
+    monkeypatch.setattr(tabulate, "_friction", known_friction)
+    table = tabulate.tabulate(replace(LAW, plane=None), tolerance=0.5, azimuths=4)
+    error = math.degrees(math.atan(0.6)) - math.degrees(math.atan(0.5))  # 4.4 degrees
+    assert table.metadata["resolution_error_friction_angle"] == pytest.approx(error)
 
 
 def test_columns_of_a_table_file(tmp_path):

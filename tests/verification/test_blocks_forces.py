@@ -224,6 +224,23 @@ def test_an_automatic_step_is_halved_in_an_impact(monkeypatch):
         until(long, 0.4)
 
 
+def test_the_step_before_an_impact_is_for_joints_at_ten_kilopascals():
+    """The automatic step of a block in the air, in closed form.
+
+    Springs of stiffness k act along the outline P, in shear too, half of every edge at either end,
+    and are counted twice for contacts with blocks that move. The corners lie at the square root of
+    (a^2 + b^2) / 4 from the centre, so that the turn has the largest eigenvalue, 6 k P / m.
+    k is interpolated on the curve of the law, whose cells are 3 % wide.
+    """
+    sim = Simulation(parse(FALL + "fraction = 0.5\n"))
+    (law,) = sim.scene.laws.values()
+    stiffness = law.first_loading_stiffness(law.closure(1e4))
+    outline = 2 * (1.0 + 0.5)
+    mass = 2600 * 1.0 * 0.5
+    limit = 2 / np.sqrt(6 * stiffness * outline / mass)
+    assert sim.dt == pytest.approx(0.5 * limit, rel=0.02)
+
+
 def test_a_scene_in_which_forces_move_no_block_needs_a_step():
     with pytest.raises(SceneError, match=r"set run.step \(s\)"):
         Simulation(parse(FALL.replace("angle = 3.0", 'fixed_motions = ["x", "y", "turn"]')))

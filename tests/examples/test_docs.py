@@ -11,6 +11,7 @@ import importlib.util
 import io
 import re
 import shlex
+import tomllib
 from dataclasses import MISSING, fields
 from pathlib import Path
 
@@ -48,6 +49,7 @@ def commands(page):
     return [line.replace(".venv/bin/", "") for line in lines]
 
 
+CITATION_KEYS = "volume", "issue", "year"
 # runs in YADE's own Python: tests/hosts/test_yade_table.py; tutorials: test_tutorials.py
 ELSEWHERE = {"docs/particles.md", *(page for page in PAGES if "/tutorial-" in page)}
 CHECKS = {  # of the variables of the examples of a page
@@ -171,6 +173,24 @@ def test_every_number_of_the_readme_has_its_command():
     numbers = set(re.findall(with_decimals_or_exponent, prose))
     assert len(numbers) > 5
     assert numbers <= set(re.findall(with_decimals_or_exponent, table))
+
+
+def test_pages_cite_the_paper_as_the_citation_file_does():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    cited = [re.search(rf"^    {key}: (\w+)$", citation, re.M)[1] for key in CITATION_KEYS]
+    found = {}
+    for name, page in PAGES.items():
+        words = " ".join(page.read_text(encoding="utf-8").split())
+        for one in re.findall(r"J\. Geophys\. Res\. (\d+)\((\w+)\), (\d{4})", words):
+            found[name] = [*one]
+    assert {"README.md", "docs/theory.md"} <= {*found}
+    assert found == dict.fromkeys(found, cited)
+
+
+def test_readme_names_the_oldest_python():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (named,) = re.findall(r"Python (\d\.\d+) or newer", PAGES["README.md"].read_text("utf-8"))
+    assert project["requires-python"] == f">={named}"
 
 
 def test_readme_shares_its_first_part_with_the_first_page_of_the_site():

@@ -25,6 +25,7 @@ from dem_demo.scene.read import parse
 from jointlaw.calibration.aperture import FORMS, FlowTest, fit_flow, fit_form
 from jointlaw.calibration.fit import fit_curves
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve
+from jointlaw.laboratory import record as laboratory_record
 from jointlaw.laboratory.record import TestRecord
 
 PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
@@ -56,6 +57,16 @@ def assert_line(axis, label, x, y):
 
 
 # ------------------------------------------------------------------------------- laboratory tests
+
+
+@pytest.mark.parametrize("prefix", PREFIXES)
+def test_prefixes_of_the_axes_of_laboratory_tests(prefix):
+    """Each prefix is for values from 1 to 1000; the largest value chooses it."""
+    for number in (1.001, 2.5, 999.0):
+        values = np.array([0.1, -1.0, 0.5]) * number * PREFIXES[prefix]
+        scaled, unit = laboratory_record._scale_to_prefix(values, "Pa")
+        assert unit == f"{prefix}Pa"
+        np.testing.assert_allclose(scaled * UNITS[unit], values)
 
 
 SHEAR_RECORD = {
@@ -473,6 +484,18 @@ def test_picture_of_blocks(record, monkeypatch):
     assert title == "known motion"
     (note,) = (text.get_text() for text in axes.texts if text.get_gid() == "note")
     assert note.startswith(f"t = {run.times[-1]:.2f} s")
+
+
+def test_joints_under_a_thousandth_of_the_stress_are_open(record, monkeypatch):
+    """Of the stress that line widths are scaled by; all other joints rest, and are stuck."""
+    run, _ = record
+    pictures = Pictures(run)
+    ratios = np.array([2e-3, 1.1e-3, 0.9e-3, 0.0])
+    zeros = np.zeros(4)
+    joints = {"slipping": zeros, "separated": zeros, "slip_rate_m/s": zeros}
+    joints["normal_stress_Pa"] = ratios * pictures.stress
+    monkeypatch.setattr(run, "joints", [joints])
+    assert pictures.states(0).tolist() == ["stuck", "stuck", "open", "open"]
 
 
 def hue_and_saturation(colour):

@@ -219,6 +219,20 @@ def test_report_of_a_scan(monkeypatch):
     assert quantities(warning) == [pytest.approx(0.4e-3)]
 
 
+def test_lengths_of_a_scan_at_which_no_asperities_are_fitted(monkeypatch):
+    lengths = []
+
+    def refuse(z, spacing, length):
+        lengths.append(length)
+        raise ValueError("too few summits")
+
+    monkeypatch.setattr(scan, "from_surface", refuse)
+    fit = SimpleNamespace(asperities=SimpleNamespace(size=0.4e-3), spacing=1e-4)
+    table = [line for line in scan._report_friction(fit, None).splitlines() if "|" in line]
+    assert [row[0][0] for row in cells_in_si(table)] == pytest.approx(lengths)
+    assert all("too few summits" in line for line in table[2:])
+
+
 def test_friction_angles_of_a_scan_are_at_the_stress_of_the_report(monkeypatch):
     used = []
 

@@ -248,6 +248,7 @@ def settle(
     verdict = Verdict.EQUILIBRIUM
     unstable = np.zeros(len(blocks.is_free), bool)
     first_displacement = 0.0
+    settlement = None  # of stable blocks, from the places as drawn
     pairs = blocks.neighbour_pairs()
     for n_round in range(MAX_ROUNDS):  # each at the last places: joints rotate with the blocks
         manager.update(blocks.motion)
@@ -260,7 +261,11 @@ def settle(
         search = EquilibriumSearch(system)
         is_near = n_round or scene.in_situ is not None
         guess = search.zero if is_near else search.stick_predictor()
-        displacement, unstable, round_verdict = search.solve(guess, unstable)
+        if settlement is None:
+            settlement = search.zero
+        displacement, unstable, round_verdict = search.solve(
+            guess, unstable, settlement=settlement
+        )
         if round_verdict is Verdict.NOT_DECIDED:
             verdict = Verdict.NOT_DECIDED
         elif verdict is Verdict.EQUILIBRIUM and unstable.any():
@@ -269,6 +274,7 @@ def settle(
         sliding = sliding + shears.reshape(-1, len(sliding)).T
         blocks.displace(search.expand(displacement * search.root))
         is_stable = ~unstable[search.block]
+        settlement = np.where(is_stable, settlement + displacement, 0.0)
         largest = np.abs(displacement[is_stable]).max(initial=0.0)
         first_displacement = first_displacement or largest
         if n_round and largest <= SETTLED_RATIO * first_displacement:

@@ -44,7 +44,7 @@ MAX_ITERATIONS = 60_000
 COMPARED_INTERVALS = 4  # intervals that are compared with as many before
 STALL_RATIO = 0.93  # fall of the smallest unbalanced force above which it no longer falls
 STEADY_RATIO = 0.8  # growth of displacements over that of before above which it is steady
-MIN_GROWTH = 0.01  # of the largest displacement: growth that counts
+MIN_GROWTH = 0.01  # of the largest displacement from the places as drawn: growth that counts
 DIVERGENCE_RATIO = 10.0  # unbalanced force over the smallest so far at which masses are raised
 MASS_INCREASE = 4.0
 FIRST_NEWTON_FORCE = 0.03  # unbalanced force (over the loads) at which Newton's method first tries
@@ -63,7 +63,7 @@ SMOOTHING_ITERATIONS = 100
 SMOOTHING_DAMPING = 1.0  # critical for a frequency of half the highest: prevents flutter
 NEWTON_FORCE = 1e-6  # unbalanced force (over the loads) from which Newton's method ends the search
 DOUBLING = 2.0  # of the pseudo-time, after which unbalanced force and growth are compared
-MIN_DOUBLING_GROWTH = 0.2  # of the largest displacement, in a doubling of the pseudo-time
+MIN_DOUBLING_GROWTH = 0.2  # the same in a doubling of the pseudo-time
 STEADY_DOUBLING_RATIO = 1.5  # of the growth over that in the doubling before: 2 at constant speed
 DOUBLING_STALL_RATIO = 0.7  # of smallest unbalanced forces; an exponential decay stays below both
 UNSTABLE_FRACTION = 0.01  # of the fastest block: slower ones are not unstable
@@ -155,6 +155,7 @@ class Relaxation:
         self.is_free = np.array(is_free, float, order="C")
         for name in WORK_ARRAYS:
             setattr(self, name, np.zeros(shape))
+        self.settlement = np.zeros(shape)  # see `relax`
         self.error: Exception | None = None  # of a step of the law in Python
         self.callbacks: list[Any] = []  # which C holds
         self.zero = np.zeros(1, np.int64)
@@ -299,6 +300,7 @@ class Relaxation:
         y: np.ndarray,
         finish: Callable[[np.ndarray], np.ndarray | None],
         implicit_step: Callable[[np.ndarray, np.ndarray], np.ndarray | None] | None = None,
+        settlement: np.ndarray | None = None,
     ) -> Relaxed:
         """Search for the equilibrium by dynamic relaxation from displacements y (n, dof).
 
@@ -310,10 +312,14 @@ class Relaxation:
         finish: Newton's method; returns the equilibrium that it finds near displacements, or None.
         implicit_step: solves (K + drag) step = unbalanced force at displacements (n, dof) for a
         drag (n, dof), None without a solution; without this function there are iterations alone.
+        settlement (n, dof): displacements from the places as drawn to the places where y is zero,
+        zero by default. Growth is relative to the displacements from the places as drawn: near
+        equilibrium y is small, and a slow decay would double it.
 
         Returns the displacements, the growth of those that move, the verdict, the number of
         iterations and the smallest unbalanced force.
         """
+        self.settlement = np.zeros_like(y) if settlement is None else settlement
         self.first_force[:] = self.unbalanced(y)
         first_size = float(np.linalg.norm(self.first_force)) / self.scale
         self.arrays.smallest_damping = 0.0
@@ -366,7 +372,7 @@ class Relaxation:
                 self._restart(now)
             sizes.append(size)
             places.append(now)
-            growth = _steady_growth(sizes, places)
+            growth = _steady_growth(sizes, places, self._largest_displacement(now))
             if growth is not None:
                 return Relaxed(now, growth, Verdict.NO_EQUILIBRIUM, self.arrays.done, size)
         growth = places[-1] - places[max(-1 - COMPARED_INTERVALS, -len(places))] if places else none
@@ -403,7 +409,8 @@ class Relaxation:
                 newton_at = NEXT_NEWTON_RATIO * size
             if size > NEWTON_FORCE:
                 y, size = self._smooth(y)
-            growth = history.steady_growth(time_step, y, size)
+            largest = self._largest_displacement(y)
+            growth = history.steady_growth(time_step, y, size, largest)
             if growth is not None:
                 return Relaxed(y, growth, Verdict.NO_EQUILIBRIUM, self.arrays.done, size)
             time_step *= next(factor for limit, factor in TIME_STEP_GROWTH if error <= limit)
@@ -421,6 +428,10 @@ class Relaxation:
         smoothed = y if has_diverged else self.y.copy()
         self.mass[:] = np.maximum(self.mass, self.masses(smoothed))
         return smoothed, float(np.linalg.norm(self.unbalanced(smoothed))) / self.scale
+
+    def _largest_displacement(self, y: np.ndarray) -> float:
+        """Largest displacement from the places as drawn at displacements y (n, dof)."""
+        return float(np.abs(self.settlement + y).max(initial=0.0))
 
     def _is_near(self, solution: np.ndarray, y: np.ndarray) -> bool:
         """Whether Newton's method ended near the displacements that it started from."""
@@ -454,10 +465,12 @@ class _History:
         self.previous_smallest = size
         self.previous_growth = np.inf
 
-    def steady_growth(self, time_step: float, y: np.ndarray, size: float) -> np.ndarray | None:
+    def steady_growth(
+        self, time_step: float, y: np.ndarray, size: float, largest: float
+    ) -> np.ndarray | None:
         """Growth (n, dof) of the displacements in the last doubling of the pseudo-time, if blocks
         move steadily; None unless the smallest unbalanced force has hardly fallen, and the
-        displacements grow by a large share and at an almost constant speed."""
+        displacements grow by a large share of the largest one and at an almost constant speed."""
         self.time += time_step
         self.smallest = min(self.smallest, size)
         if self.time < DOUBLING * self.compared_at:
@@ -465,7 +478,7 @@ class _History:
         growth = y - self.y
         fastest = float(np.abs(growth).max())
         stalls = self.smallest > DOUBLING_STALL_RATIO * self.previous_smallest
-        grows = fastest > MIN_DOUBLING_GROWTH * np.abs(y).max()
+        grows = fastest > MIN_DOUBLING_GROWTH * largest
         is_steady = fastest > STEADY_DOUBLING_RATIO * self.previous_growth
         self.steps = 0
         self.compared_at = self.time
@@ -476,12 +489,14 @@ class _History:
         return growth if stalls and grows and is_steady else None
 
 
-def _steady_growth(sizes: list[float], places: list[np.ndarray]) -> np.ndarray | None:
+def _steady_growth(
+    sizes: list[float], places: list[np.ndarray], largest: float
+) -> np.ndarray | None:
     """Growth (n, dof) of the displacements over the last intervals, if blocks move steadily.
 
     sizes, places: unbalanced force and displacements at each check. None unless the smallest
-    unbalanced force no longer falls, and the displacements grow by a noticeable share and at least
-    about as fast as in the intervals before.
+    unbalanced force no longer falls, and the displacements grow by a noticeable share of the
+    largest one and at least about as fast as in the intervals before.
     """
     n = COMPARED_INTERVALS
     if len(sizes) <= 2 * n:
@@ -490,6 +505,6 @@ def _steady_growth(sizes: list[float], places: list[np.ndarray]) -> np.ndarray |
     previous_growth = places[-1 - n] - places[-1 - 2 * n]
     fastest = np.abs(growth).max()
     stalls = min(sizes[-n:]) > STALL_RATIO * min(sizes[-2 * n : -n])
-    grows = fastest > MIN_GROWTH * np.abs(places[-1]).max()
+    grows = fastest > MIN_GROWTH * largest
     is_steady = fastest > STEADY_RATIO * np.abs(previous_growth).max()
     return growth if stalls and grows and is_steady else None

@@ -228,13 +228,18 @@ class EquilibriumSearch:
         return out
 
     def solve(
-        self, start: np.ndarray, unstable: np.ndarray, name_unstable: bool = True
+        self,
+        start: np.ndarray,
+        unstable: np.ndarray,
+        name_unstable: bool = True,
+        settlement: np.ndarray | None = None,
     ) -> Solution:
         """Equilibrium of all blocks but the unstable ones, from displacements `start` (m,).
 
         unstable (n,): blocks known to be unstable; they stay where they are. With `name_unstable`
         further unstable blocks are fixed as well, and the others are solved again; else the search
-        ends with the first verdict.
+        ends with the first verdict. settlement (m,): displacements from the places as drawn to the
+        present ones, zero by default.
         """
         known_unstable = unstable
         unstable = unstable.copy()
@@ -248,6 +253,7 @@ class EquilibriumSearch:
                 self.expand(y),
                 partial(self._finish, is_fixed),
                 partial(self._implicit_step, is_fixed),
+                self.expand(self.zero if settlement is None else settlement),
             )
             displacement = relaxed.y[self.system.is_free]
             if relaxed.verdict is Verdict.EQUILIBRIUM:

@@ -263,9 +263,7 @@ def settle(
         guess = search.zero if is_near else search.stick_predictor()
         if settlement is None:
             settlement = search.zero
-        displacement, unstable, round_verdict = search.solve(
-            guess, unstable, settlement=settlement
-        )
+        displacement, unstable, round_verdict = search.solve(guess, unstable, settlement=settlement)
         if round_verdict is Verdict.NOT_DECIDED:
             verdict = Verdict.NOT_DECIDED
         elif verdict is Verdict.EQUILIBRIUM and unstable.any():

@@ -201,6 +201,48 @@ def test_factor_of_safety_of_a_slope_equals_the_factor_of_coulomb_of_the_same_st
     assert factor == pytest.approx(coulomb_factor, rel=0.03)
 
 
+def high_slope(spacing, seed):
+    """A random slope 20 m high of two joint sets; spacing in m."""
+    text = 'law = "joint"\n[laws.joint]\n' + coulomb(0.7002, 5e9, 2e9)
+    outline = [[-30, -2], [12, -2], [12, 0], [0, 0], [-12, 20], [-30, 20]]
+    text += "[[rock]]\n" + lines(name="slope", outline=outline, seed=seed)
+    text += "[[rock.set]]\n"
+    text += lines(dip=30.0, spacing=spacing, scatter=0.2, through=[-0.2, 0.6])
+    text += "[[rock.set]]\n"
+    text += lines(dip=-60.0, spacing=1.4 * spacing, scatter=0.3, persistence=0.8)
+    fixed = [[-40, -5], [13, -5], [13, 0.2], [0.3, 0.31], [-24, 14.28], [-28, 19], [-28, 22]]
+    text += "[[rock.fixed]]\n" + lines(corners=[*fixed, [-40, 22]])
+    return parse("gravity = [0.0, -9.81]\n" + text + "[run]\nend = 1.0\n")
+
+
+def displacement_in_a_run(sim, end):
+    """Largest displacement in m from step 0 to a time `end` in s."""
+    first = sim.blocks.motion[:2].copy()
+    until(sim, end)
+    return np.abs(sim.blocks.motion[:2] - first).max()
+
+
+@pytest.mark.parametrize("reduction", [0.98, pytest.param(0.983, marks=pytest.mark.slow)])
+def test_a_slope_near_failure_starts_in_equilibrium(reduction):
+    """Near failure a search is slow. A second round starts near its end, so displacements since
+    then double while the motion decays: that is no sign of blocks without equilibrium."""
+    sim = Simulation(weakened(high_slope(1.2, 2), reduction))
+    assert not sim.unstable.any()
+
+
+@pytest.mark.slow
+def test_runs_of_929_blocks_agree_with_their_factor_of_safety():
+    """At rest at 3 % less than the factor of safety, falling at 3 % more."""
+    slope = high_slope(0.35, 1)
+    factor = factor_of_safety(slope)
+    stable = Simulation(weakened(slope, 0.97 * factor))
+    assert not stable.unstable.any()
+    assert displacement_in_a_run(stable, 0.05) < 1e-9
+    failing = Simulation(weakened(slope, 1.03 * factor))
+    assert failing.unstable.any()
+    assert displacement_in_a_run(failing, 0.05) > 1e-4
+
+
 def test_an_interrupted_search_continues(tmp_path, monkeypatch, capsys):
     """After Ctrl-C the same command computes only the unfinished trials, with the same results: it
     prints factor and tilt, and draws the failure."""

@@ -100,18 +100,18 @@ class FacePoints(ContactRows):
         first = np.searchsorted(points.contact, points.contact)
         keys = np.array([points.face_a, points.face_b, np.arange(len(first)) - first])
         of_a = points.plane_is_of_a
-        own = np.where(of_a, points.block_b, points.block_a)
-        other = np.where(of_a, points.block_a, points.block_b)
-        arm = points.point - surfaces.position[own]
+        point_block = np.where(of_a, points.block_b, points.block_a)
+        plane_block = np.where(of_a, points.block_a, points.block_b)
+        arm = points.point - surfaces.position[point_block]
         frame = contact_axes(surfaces, points, axis_2)
         frame[of_a] *= -1.0
-        base = points.base - surfaces.position[other]
+        base = points.base - surfaces.position[plane_block]
         return cls(
             blocks,
             keys,
             plane_is_of_a=of_a,
-            local_point=np.einsum("kji,kj->ki", surfaces.rotation[own], arm),
-            local_frame=frame @ surfaces.rotation[other],
+            local_point=np.einsum("kji,kj->ki", surfaces.rotation[point_block], arm),
+            local_frame=frame @ surfaces.rotation[plane_block],
             plane_offset=np.einsum("ki,ki->k", points.normal, base),
             found_area=points.area,
             found_at=blocks.motion[:6]
@@ -158,9 +158,9 @@ class FacePoints(ContactRows):
     def point(self) -> np.ndarray:
         """Places (k, 3) of the points in m."""
         blocks = self.blocks
-        own = np.where(self.plane_is_of_a, self.block_b, self.block_a)
-        arm = np.einsum("kij,kj->ki", blocks.axes[own], self.local_point)
-        return blocks.motion[:3].T[own] + arm
+        point_block = np.where(self.plane_is_of_a, self.block_b, self.block_a)
+        arm = np.einsum("kij,kj->ki", blocks.axes[point_block], self.local_point)
+        return blocks.motion[:3].T[point_block] + arm
 
     @property
     def point_in_a(self) -> np.ndarray:
@@ -171,8 +171,8 @@ class FacePoints(ContactRows):
     @property
     def directions(self) -> np.ndarray:
         """Normal from b to a, axis 2 and axis 3 (k, 3, 3) of the points."""
-        other = np.where(self.plane_is_of_a, self.block_a, self.block_b)
-        frame = np.einsum("kij,kcj->kci", self.blocks.axes[other], self.local_frame)
+        plane_block = np.where(self.plane_is_of_a, self.block_a, self.block_b)
+        frame = np.einsum("kij,kcj->kci", self.blocks.axes[plane_block], self.local_frame)
         return np.where(self.plane_is_of_a[:, None, None], -frame, frame)
 
     def update(self) -> None:
@@ -235,7 +235,7 @@ class FaceContactManager:
         pairs = np.ascontiguousarray(pairs[~self.is_fixed[pairs].all(axis=1)])
         present = self.contacts
         is_searched = has_moved[present.block_a] | has_moved[present.block_b]
-        kept = np.flatnonzero(~is_searched)
+        unsearched = np.flatnonzero(~is_searched)
         searched = np.flatnonzero(is_searched)
         surfaces = self.blocks.surfaces
         points = find_contacts(
@@ -248,20 +248,20 @@ class FaceContactManager:
         new_offset = np.maximum(detected.closure, 0.0) * (not keep_closure)
         old_offset = np.append(self.closure_offset, 0.0)[old_row]
         offset = np.where(old_row < 0, new_offset, old_offset)
-        self.law = np.concatenate([self.law[kept], law])
-        self.closure_offset = np.concatenate([self.closure_offset[kept], offset])
-        self.contacts = present.joined(kept, detected)
+        self.law = np.concatenate([self.law[unsearched], law])
+        self.closure_offset = np.concatenate([self.closure_offset[unsearched], offset])
+        self.contacts = present.joined(unsearched, detected)
         self.face_pairs = self.contacts.face_pairs
-        return np.concatenate([kept, old_row])
+        return np.concatenate([unsearched, old_row])
 
     def _blocks_to_rebuild(self, motion: np.ndarray) -> np.ndarray:
         """Mask (n,) of the blocks whose contacts must be found again, as in the plane.
 
         Their present positions are recorded as the positions of the rebuild.
         """
-        moved = motion[:6] - self.rebuilt_at
-        rotation = np.abs(moved[3:]).sum(axis=0)
-        distance = np.linalg.norm(moved[:3], axis=0) + rotation * self.blocks.radius
+        displacement = motion[:6] - self.rebuilt_at
+        rotation = np.abs(displacement[3:]).sum(axis=0)
+        distance = np.linalg.norm(displacement[:3], axis=0) + rotation * self.blocks.radius
         has_rested = distance <= MOVED_FRACTION * self.skins  # false before the first rebuild
         has_moved = self.needs_rebuild | ~has_rested
         self.rebuilt_at[:, has_moved] = motion[:6, has_moved]
@@ -281,8 +281,8 @@ class FaceContactManager:
         block_pair = found.block_a * n + found.block_b
         present_pair = present.block_a * n + present.block_b
         other_row, distance = _nearest(found, present, rows, block_pair, present_pair)
-        reach = MAX_SHIFT_PER_SKIN * (self.skins[found.block_a] + self.skins[found.block_b])
-        is_same_joint = (other_row >= 0) & (distance <= reach)
+        max_shift = MAX_SHIFT_PER_SKIN * (self.skins[found.block_a] + self.skins[found.block_b])
+        is_same_joint = (other_row >= 0) & (distance <= max_shift)
         is_same_joint[is_same_joint] &= self.law[other_row[is_same_joint]] == law[is_same_joint]
         return np.where((old_row < 0) & is_same_joint, other_row, old_row)
 
@@ -337,10 +337,10 @@ class FaceContactManager:
         cosine = np.einsum("pj,pj->p", axis_2[candidate], axis_2[row])
         is_neighbour = (distance <= skin) & (step <= MAX_SEAM_STEP * skin)
         is_neighbour &= (self.law[candidate] == self.law[row]) & (cosine >= MIN_SEAM_COSINE)
-        near = np.flatnonzero(is_neighbour)
-        across_seam = contacts.keys[side[near], candidate[near]]
-        other = contacts.keys[side[near], row[near]]
-        is_neighbour[near] = self._are_coplanar(across_seam, other, skin[near])
+        plausible = np.flatnonzero(is_neighbour)
+        across_seam = contacts.keys[side[plausible], candidate[plausible]]
+        face_of_row = contacts.keys[side[plausible], row[plausible]]
+        is_neighbour[plausible] = self._are_coplanar(across_seam, face_of_row, skin[plausible])
         distance[~is_neighbour] = np.inf
         return _find_nearest(len(rows), number, candidate, distance)
 
@@ -379,9 +379,9 @@ def _nearest(
     Distances are in the frame of block a.
     """
     order = rows[np.argsort(present_code[rows], kind="stable")]
-    known = present_code[order]
-    first = np.searchsorted(known, code)
-    last = np.searchsorted(known, code, side="right")
+    sorted_codes = present_code[order]
+    first = np.searchsorted(sorted_codes, code)
+    last = np.searchsorted(sorted_codes, code, side="right")
     place_before = present.point_in_a
     place_now = found.point_in_a
     nearest = np.full(len(first), -1)
@@ -424,6 +424,6 @@ def _find_nearest(
     candidate = candidate[is_candidate]
     order = np.lexsort((candidate, distance[is_candidate], number))
     nearest = np.full(n, -1)
-    found, first = np.unique(number[order], return_index=True)
-    nearest[found] = candidate[order][first]
+    contact_numbers, first = np.unique(number[order], return_index=True)
+    nearest[contact_numbers] = candidate[order][first]
     return nearest

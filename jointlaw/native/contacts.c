@@ -6,6 +6,7 @@
  * every vector width: -DKIND=_8 and the like is the suffix of its functions.
  */
 #include "contacts.h"
+#include "export.h"
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -144,7 +145,7 @@ static void replace_steep_axes(const jlaw_contacts *c)
 }
 
 /* Frames of all contacts after a step, and increments of their displacements in the mean frame */
-extern void NAME(jlaw_contact_motion)(const jlaw_contacts *c);
+IN_C void NAME(jlaw_contact_motion)(const jlaw_contacts *c);
 void NAME(jlaw_contact_motion)(const jlaw_contacts *c)
 {
   const long long n = c->n;
@@ -175,7 +176,7 @@ void NAME(jlaw_contact_motion)(const jlaw_contacts *c)
 }
 
 /* Forces and torques on all bodies by the tractions F */
-extern void NAME(jlaw_contact_forces)(const jlaw_contacts *c);
+IN_C void NAME(jlaw_contact_forces)(const jlaw_contacts *c);
 void NAME(jlaw_contact_forces)(const jlaw_contacts *c)
 {
   const long long n = c->n;

@@ -61,15 +61,15 @@ class Sources:
 
     def block_at(self, file, line):
         """The innermost block that contains a line."""
-        found = (file, MODULE, 0)
+        innermost = (file, MODULE, 0)
         smallest = float("inf")
         for name, number, statements in blocks_of(self.trees[file]):
             first = statements[0].lineno if statements else 0
             last = statements[-1].end_lineno if statements else 0
             if name != MODULE and first <= line <= last and last - first < smallest:
-                found = (file, name, number)
+                innermost = (file, name, number)
                 smallest = last - first
-        return found
+        return innermost
 
     def names_of_value(self, file, line):
         """Names of the value of a module at a line and of the values made from it.
@@ -210,7 +210,7 @@ class ExecutedMap:
         names = None
         if block and block[1] == MODULE:
             names = self.sources.names_of_value(file, line)
-        found = {}
+        able_tests = {}
         for test_file, record in self.records.items():
             if names is None:
                 acting = {i for i, one in enumerate(record["blocks"]) if tuple(one) == block}
@@ -223,18 +223,18 @@ class ExecutedMap:
             reads = file in record["read"] or (names and self.reads_names(record, names))
             every = [(name, seconds) for name, (_, seconds) in record["tests"].items()]
             if reads or (acting and names is None and block[1] == MODULE):
-                found[test_file] = every
+                able_tests[test_file] = every
             elif acting:
                 tests = record["tests"].items()
-                found[test_file] = [
+                able_tests[test_file] = [
                     (name, seconds)
                     for name, (blocks, seconds) in tests
                     if not acting.isdisjoint(blocks)
                 ]
-        found |= {
+        able_tests |= {
             file: [(file, math.inf)] for file in self.test_files() if file not in self.records
         }
-        return {file: sorted(tests, key=lambda one: one[1]) for file, tests in found.items()}
+        return {file: sorted(tests, key=lambda one: one[1]) for file, tests in able_tests.items()}
 
     def reads_names(self, record, names):
         """Whether a test file or a helper that it imports names one of these values."""

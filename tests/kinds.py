@@ -31,6 +31,17 @@ def make_law(
     )
 
 
+# A joint in a plane as fits give them: heights of tens of micrometres, a mating length
+FITTED = jl.JointLaw(
+    orientation=jl.Orientation(4.0),
+    asperity=jl.Asperity(K=2e10, lam=1.2, eta=0.5, mu=0.6),
+    heights=jl.GammaHeights(3.0, 20e-6, formation="individual"),
+    asperity_density=1e6,
+    plane=0.0,
+    mating_length=2e-3,
+)
+
+
 @dataclass(frozen=True)
 class ExponentialHeights:
     """Heights of a class that is not part of the package, so that no law file can name it."""

@@ -324,11 +324,11 @@ def try_faults_of_outputs(options):
     try_together(copies, faults, detected_by, "not slow", by_file, options.limit)
     report(by_kind, faults, detected_by)
     if options.slow:
-        left = [fault for fault in faults if not detected_by[fault]]
-        every = dict.fromkeys(left, tests.test_files())
-        for fault in left:
+        undetected = [fault for fault in faults if not detected_by[fault]]
+        every = dict.fromkeys(undetected, tests.test_files())
+        for fault in undetected:
             del detected_by[fault]
-        try_together(copies, left, detected_by, "slow", every, options.limit)
+        try_together(copies, undetected, detected_by, "slow", every, options.limit)
         report(by_kind, faults, detected_by)
 
 
@@ -346,8 +346,8 @@ def try_together(copies, faults, detected_by, marks, able, limit):
             without_fault = failing_tests(copy, [], ["-m", marks], failed)
             failed = [test for test in failed if test not in without_fault]
         for fault in group:
-            own = [test for test in failed if test.partition("::")[0] in able[fault]]
-            by = own and failing_tests(copy, [fault], ["-x", "-m", marks], own, limit)
+            able_tests = [test for test in failed if test.partition("::")[0] in able[fault]]
+            by = able_tests and failing_tests(copy, [fault], ["-x", "-m", marks], able_tests, limit)
             detected_by[fault] = by[0] if by else ""
             print(f"{fault.kind} {fault.file}: {' '.join(fault.what.split())[:200]}\n   ",
                   detected_by[fault] or f"SURVIVED {marks}", flush=True)  # fmt: skip
@@ -367,9 +367,9 @@ def failing_tests_in_parallel(copies, faults, marks, files):
 def report(by_kind, faults, detected_by):
     """Print how many faults of each kind are detected so far."""
     for kind in sorted(by_kind):
-        own = [fault for fault in faults if fault.kind == kind]
-        seen = sum(bool(detected_by.get(fault)) for fault in own)
-        print(f"{kind:10} {seen} of {len(own)} detected; {len(by_kind[kind])} possible")
+        faults_of_kind = [fault for fault in faults if fault.kind == kind]
+        seen = sum(bool(detected_by.get(fault)) for fault in faults_of_kind)
+        print(f"{kind:10} {seen} of {len(faults_of_kind)} detected; {len(by_kind[kind])} possible")
     print(f"all        {sum(map(bool, detected_by.values()))} of {len(faults)}", flush=True)
 
 
@@ -391,12 +391,12 @@ def likely_first(fault, able):
         return likely.index(file) if file in likely else len(likely), seconds
 
     chosen = []
-    left = LIKELY_TIME
+    time_left = LIKELY_TIME
     for file in sorted(able, key=rank):
         for name, seconds in able[file]:
             is_unknown = math.isinf(seconds)
-            left -= 0.0 if is_unknown else seconds
-            if file in likely if is_unknown else left > 0.0 or not chosen:
+            time_left -= 0.0 if is_unknown else seconds
+            if file in likely if is_unknown else time_left > 0.0 or not chosen:
                 chosen.append(name)
     # a list is tested by iterating over it: the test of a key or an option has its name
     names = [word for word in fault.what.split() if word not in ("key", "is", "ignored")]

@@ -137,10 +137,10 @@ class Recorder:
 
     def take_marks(self):
         """Blocks executed since the last call."""
-        found = [block for i, block in enumerate(self.blocks) if self.marks[i]]
+        executed = [block for i, block in enumerate(self.blocks) if self.marks[i]]
         self.marks[: len(self.blocks)] = bytes(len(self.blocks))
-        self.executed.update(found)
-        return found
+        self.executed.update(executed)
+        return executed
 
     def start_test(self):
         """Forget what was executed before a test."""
@@ -150,10 +150,10 @@ class Recorder:
 
     def finish_test(self, name):
         """Note the blocks that a test and its processes have executed, and its time."""
-        found = {*self.take_marks()}
+        blocks = {*self.take_marks()}
         for path in {*self.folder.glob("*.json")} - self.written:
-            found |= {tuple(block) for block in json.loads(path.read_text())["blocks"]}
-        self.tests[name] = {"blocks": sorted(found), "s": processor_time() - self.started}
+            blocks |= {tuple(block) for block in json.loads(path.read_text())["blocks"]}
+        self.tests[name] = {"blocks": sorted(blocks), "s": processor_time() - self.started}
 
     def write(self):
         """Write the marks, the files read and the tests."""

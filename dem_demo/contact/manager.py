@@ -37,6 +37,7 @@ import numpy as np
 from ..compiled import address
 from ..native.layout import CONSTANTS
 from ..scene import Scene, SceneError
+from .candidates import find_equal, find_nearest
 from .geometry import Contacts, Outlines
 
 RANGE_TOLERANCE = CONSTANTS["RANGE_TOLERANCE"].value
@@ -193,32 +194,25 @@ class ContactManager:
         """
         contacts = self.contacts
         edge_pairs = contacts.edge_pairs
-        own_edges = edge_pairs[rows].ravel()  # the shared edge of each candidate is one of them
-        is_own_edge = np.zeros(len(self.outlines.block), bool)
-        is_own_edge[own_edges] = True
-        first, second = edge_pairs.T
-        loaded = np.flatnonzero(bears_load & (is_own_edge[first] | is_own_edge[second]))
-        loaded_edges = edge_pairs[loaded].ravel()
-        order = np.argsort(loaded_edges, kind="stable")
-        first, last = (
-            np.searchsorted(loaded_edges[order], own_edges, side) for side in ("left", "right")
-        )
-        count = last - first
-        which = np.repeat(np.arange(len(own_edges)), count)
-        place = order[np.arange(len(which)) - np.repeat(np.cumsum(count) - count - first, count)]
-        candidate = loaded[place // 2]
-        row = rows[which // 2]
-        across_seam = edge_pairs[candidate, 1 - place % 2]
-        other = edge_pairs[row, 1 - which % 2]
+        edges = edge_pairs[rows].ravel()
+        is_edge_of_row = np.zeros(len(self.outlines.block), bool)
+        is_edge_of_row[edges] = True
+        first_edge, second_edge = edge_pairs.T
+        shares_edge = is_edge_of_row[first_edge] | is_edge_of_row[second_edge]
+        loaded = np.flatnonzero(bears_load & shares_edge)
+        shared, shared_by_candidate = find_equal(edges, edge_pairs[loaded].ravel())
+        number = shared // 2  # of two edges each
+        row = rows[number]
+        candidate = loaded[shared_by_candidate // 2]
+        across_seam = edge_pairs[candidate, 1 - shared_by_candidate % 2]
+        edge_of_row = edge_pairs[row, 1 - shared % 2]
         max_step = MAX_SEAM_STEP * self._skin(contacts.block_a[row], contacts.block_b[row])
         is_as_deep = np.abs(contacts.closure[candidate] - contacts.closure[row]) <= max_step
-        has_law = self.law[candidate] == self.laws_of(edge_pairs[rows])[which // 2]
-        found = np.flatnonzero(is_as_deep & has_law & self._are_coplanar(across_seam, other))
-        distance = np.abs(contacts.position[candidate[found]] - contacts.position[row[found]])
-        found = found[np.lexsort([candidate[found], distance])]
-        neighbours = np.full(len(rows), -1)
-        neighbours[which[found[::-1]] // 2] = candidate[found[::-1]]  # the nearest is written last
-        return neighbours
+        has_law = self.law[candidate] == self.laws_of(edge_pairs[rows])[number]
+        is_neighbour = is_as_deep & has_law & self._are_coplanar(across_seam, edge_of_row)
+        distance = np.abs(contacts.position[candidate] - contacts.position[row])
+        distance[~is_neighbour] = np.inf
+        return find_nearest(len(rows), number, candidate, distance)
 
     def _are_coplanar(self, edges: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Whether edges (m,) of other blocks continue the edges `others` (m,) across seams.

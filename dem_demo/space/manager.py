@@ -26,6 +26,7 @@ import numpy as np
 
 from ..compiled import FacePointArrays
 from ..contact import ContactRows
+from ..contact.candidates import find_equal, find_nearest
 from ..scene import SceneError
 from .blocks import SpaceBlocks
 from .contacts import (
@@ -326,7 +327,7 @@ class FaceContactManager:
         loaded = np.flatnonzero(bears_load)
         position = contacts.point
         axis_2 = contacts.directions[:, 1]
-        pairs = [_find_equal(keys[rows], keys[loaded]) for keys in contacts.keys[:2]]
+        pairs = [find_equal(keys[rows], keys[loaded]) for keys in contacts.keys[:2]]
         number, candidate = np.concatenate(pairs, axis=1)
         row = rows[number]
         candidate = loaded[candidate]
@@ -342,7 +343,7 @@ class FaceContactManager:
         face_of_row = contacts.keys[side[plausible], row[plausible]]
         is_neighbour[plausible] = self._are_coplanar(across_seam, face_of_row, skin[plausible])
         distance[~is_neighbour] = np.inf
-        return _find_nearest(len(rows), number, candidate, distance)
+        return find_nearest(len(rows), number, candidate, distance)
 
     def _are_coplanar(self, faces: np.ndarray, others: np.ndarray, skin: np.ndarray) -> np.ndarray:
         """Whether faces (m,) of other blocks continue the faces `others` (m,) across a seam.
@@ -395,35 +396,3 @@ def _nearest(
         nearest[place] = row[is_nearer]
         smallest[place] = distance[is_nearer]
     return nearest, smallest
-
-
-def _find_equal(values: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return all pairs of an index into `values` (m,) and one into `known` (k,) with equal numbers.
-
-    Sorted by the index into `values`, then by the index into `known`.
-    """
-    order = np.argsort(known, kind="stable")
-    in_order = known[order]
-    first = np.searchsorted(in_order, values)
-    count = np.searchsorted(in_order, values, side="right") - first
-    index = np.repeat(np.arange(len(values)), count)
-    place = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
-    return index, order[np.repeat(first, count) + place]
-
-
-def _find_nearest(
-    n: int, number: np.ndarray, candidate: np.ndarray, distance: np.ndarray
-) -> np.ndarray:
-    """Return the nearest candidate (n,) of each of n contacts, -1 where there is none.
-
-    number, candidate, distance (p,): contact, its candidate, and the distance of both (m); infinite
-    for no candidate. Of equally near candidates the one with the lowest number is returned.
-    """
-    is_candidate = np.isfinite(distance)
-    number = number[is_candidate]
-    candidate = candidate[is_candidate]
-    order = np.lexsort((candidate, distance[is_candidate], number))
-    nearest = np.full(n, -1)
-    contact_numbers, first = np.unique(number[order], return_index=True)
-    nearest[contact_numbers] = candidate[order][first]
-    return nearest

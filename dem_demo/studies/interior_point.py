@@ -146,10 +146,10 @@ class _Method:
                     return LeastImbalance(
                         point.x, point.multiplier, imbalance, lower_bound, iteration
                     )
-            moved = self._iterate(point, residuals)
-            if moved is None:
+            next_point = self._iterate(point, residuals)
+            if next_point is None:
                 return None
-            point = moved
+            point = next_point
         return None
 
     def _line_values(self, x: np.ndarray) -> np.ndarray:
@@ -193,10 +193,10 @@ class _Method:
             """Newton's step that changes the products of complementary values by these amounts."""
             g = dual - self._line_sums((of_lines - multiplier * line_gap) / slack)
             response, _ = contacts.solve(g, lines)
-            right = balance - self.A @ response - of_u / above + of_w / below
-            dy = factors.solve(right)
+            unbalanced = balance - self.A @ response - of_u / above + of_w / below
+            dy = factors.solve(unbalanced)
             response, _ = contacts.solve(self.transpose @ dy, lines)
-            dy += factors.solve(right - self.A @ response - diagonal * dy)  # refinement
+            dy += factors.solve(unbalanced - self.A @ response - diagonal * dy)  # refinement
             dx, line_change = contacts.solve(g + self.transpose @ dy, lines)
             slack_step = line_gap - line_change
             return _Point(
@@ -235,8 +235,8 @@ class _Method:
             centre - w * below - predictor.w * predictor.y,
         )
         step_share = STEP_SHARE[now < LATE_COMPLEMENTARITY]
-        primal, dual_share = (step_share * share for share in shares(corrector))
-        return point.moved(corrector, primal, dual_share)
+        primal_step, dual_step = (step_share * size for size in shares(corrector))
+        return point.moved(corrector, primal_step, dual_step)
 
     def _eliminate_contacts(self, weight: np.ndarray) -> "_Contacts":
         """The matrices C' diag(weight) C of the contacts, in triangular form."""

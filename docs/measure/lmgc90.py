@@ -133,14 +133,14 @@ def walls(turns: int = 2) -> None:
                 spent[i] = min(spent[i], (time.process_time() - began) / steps)
             displacement, of_step = in_own_process(solids, WALL_TIME)
             spent[2] = min(spent[2], of_step)
-        moved = [
+        displacements = [
             np.abs(sim.blocks.motion[:3] - start).max()
             for sim, start in zip(sims, starts, strict=True)
         ]
-        moved.append(np.abs(displacement).max())
+        displacements.append(np.abs(displacement).max())
         step = [*(sim.dt for sim in sims), LMGC90_STEP]
         names = ["Coulomb", "`fast`", "LMGC90"]
-        for name, dt, of_step, distance in zip(names, step, spent, moved, strict=True):
+        for name, dt, of_step, distance in zip(names, step, spent, displacements, strict=True):
             rows.append(
                 [
                     wide * high - high // 2,

@@ -184,9 +184,11 @@ class JointBatch:
             values = values[in_full_blocks:]
         self._state[block_index(self._state, index, slice(rows))] = values
         self._engine.refresh(self._state, self._n)
-        restored = self._closure_bounds_at(state.values[:, : self.law.dim]).max(initial=0.0)
-        others = 0.0 if where is None else self._closure_bound
-        self._closure_bound = max(others, restored)
+        bound_of_restored = self._closure_bounds_at(state.values[:, : self.law.dim]).max(
+            initial=0.0
+        )
+        bound_of_unlisted = 0.0 if where is None else self._closure_bound
+        self._closure_bound = max(bound_of_unlisted, bound_of_restored)
 
     def reset(self, index: Index | None = None, mated: bool = True) -> None:
         """Return the joints at `index` (all if None) to their initial state.

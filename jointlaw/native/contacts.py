@@ -54,13 +54,13 @@ class ContactGeometry:
         before: tuple[Array, Array],
         after: tuple[Array, Array],
         has_plane: bool,
-        given: dict[str, Array],
+        geometry: dict[str, Array],
     ) -> dict[str, Array]:
         """Frames of contacts after a step, and increments of their displacements.
 
         contacts: `Joints.contact_data`; its "axis" changes where a contact has rolled. before,
         after: positions (bodies, 3) and orientations (bodies, 4) of bodies. has_plane: whether all
-        contacts are parts of flat joints. given: arrays n (3, m), un (m,), c1 and c2 (3, m), whose
+        contacts are parts of flat joints. geometry: n (3, m), un (m,), c1 and c2 (3, m), whose
         columns of contacts that are not of two spheres are input; the other columns are written.
 
         Returns n, c1, c2, t2 (3, m), closure, approach (m,) and d (3, m), where d.T is contiguous.
@@ -68,7 +68,7 @@ class ContactGeometry:
         n = len(contacts["closure"])
         bodies = len(after[0])
         contacts["axis"] = np.ascontiguousarray(contacts["axis"])  # which the library changes
-        result = given | {
+        result = geometry | {
             "t2": np.empty((3, n)),
             "closure": np.empty(n),
             "d": np.empty((n, 3)),

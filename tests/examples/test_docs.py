@@ -178,13 +178,13 @@ def test_every_number_of_the_readme_has_its_command():
 def test_pages_cite_the_paper_as_the_citation_file_does():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     cited = [re.search(rf"^    {key}: (\w+)$", citation, re.M)[1] for key in CITATION_KEYS]
-    found = {}
+    citations = {}
     for name, page in PAGES.items():
         words = " ".join(page.read_text(encoding="utf-8").split())
         for one in re.findall(r"J\. Geophys\. Res\. (\d+)\((\w+)\), (\d{4})", words):
-            found[name] = [*one]
-    assert {"README.md", "docs/theory.md"} <= {*found}
-    assert found == dict.fromkeys(found, cited)
+            citations[name] = [*one]
+    assert {"README.md", "docs/theory.md"} <= {*citations}
+    assert citations == dict.fromkeys(citations, cited)
 
 
 def test_readme_names_the_oldest_python():

@@ -8,6 +8,7 @@ import re
 
 import numpy as np
 import pytest
+from kinds import FITTED
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import rgb_to_hsv, same_color, to_rgba
 from matplotlib.quiver import Quiver
@@ -119,16 +120,6 @@ def test_picture_of_a_closure_test():
 # ------------------------------------------------------------------------------------------- fits
 
 
-LAW = jl.JointLaw(
-    orientation=jl.Orientation(4.0),
-    asperity=jl.Asperity(K=2e10, lam=1.2, eta=0.5, mu=0.6),
-    heights=jl.GammaHeights(3.0, 20e-6, formation="individual"),
-    asperity_density=1e6,
-    plane=0.0,
-    mating_length=2e-3,
-)
-
-
 @pytest.fixture(scope="module")
 def fit():
     """A fit of one parameter to points that no other code has computed, and two more tests."""
@@ -145,7 +136,7 @@ def fit():
         for normal in (1e6, 3e6)
     ]
     result = fit_curves(
-        [ClosureCurve(stress, closure), tests[0]], free=["asperity_density"], law=LAW
+        [ClosureCurve(stress, closure), tests[0]], free=["asperity_density"], law=FITTED
     )
     return result, stress, closure, tests
 
@@ -258,7 +249,7 @@ def test_picture_of_a_fit(fit):
 def test_picture_of_a_flow_test():
     law = jl.JointLaw(
         orientation=jl.Orientation(4.0),
-        asperity=LAW.asperity,
+        asperity=FITTED.asperity,
         heights=jl.GammaHeights(3.0, 20e-6, formation="individual"),
         asperity_density=1e6,
     )

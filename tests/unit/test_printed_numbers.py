@@ -16,6 +16,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from kinds import FITTED
 from scipy.stats import norm
 
 import jointlaw as jl
@@ -47,15 +48,7 @@ SI = {
 }  # fmt: skip
 UNIT = "|".join(sorted(map(re.escape, SI), key=len, reverse=True))
 NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
-LAW = jl.JointLaw(
-    orientation=jl.Orientation(4.0),
-    asperity=jl.Asperity(K=2e10, lam=1.2, eta=0.5, mu=0.6),
-    heights=jl.GammaHeights(3.0, 20e-6, formation="individual"),
-    asperity_density=1e6,
-    plane=0.0,
-    mating_length=2e-3,
-    resolution="fast",
-)
+LAW = replace(FITTED, resolution="fast")
 
 
 def quantities(text):

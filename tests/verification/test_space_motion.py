@@ -157,11 +157,11 @@ def test_a_block_at_rest_veers_most_in_its_first_slip():
         start = sim.blocks.motion[:2, 1].copy()
         tilts[settled] = [np.hypot(*start), np.degrees(np.arctan2(*start[::-1]))]
         for distance in (0.2e-3, 1.5e-3):
-            moved = start * 0.0
-            while np.hypot(*moved) < distance:
+            displacement = start * 0.0
+            while np.hypot(*displacement) < distance:
                 sim.step()
-                moved = sim.blocks.motion[:2, 1] - start
-            tilts[settled].append(np.degrees(np.arctan2(moved[1], moved[0])))
+                displacement = sim.blocks.motion[:2, 1] - start
+            tilts[settled].append(np.degrees(np.arctan2(displacement[1], displacement[0])))
     slipped, _, first, later = tilts[10.0]
     assert slipped < 5e-6
     assert 38.8 < first < 39.4

@@ -389,9 +389,9 @@ class Joints:
         x = self.x
         q = self.q
         if self.law.geometry is not None:
-            given = self._read_other_shapes(x, self._empty_geometry())
+            geometry = self._read_other_shapes(x, self._empty_geometry())
             return self.law.geometry.motion(
-                c, (x0.T, q0.T), (x.T, q.T), self.plane is not None, given
+                c, (x0.T, q0.T), (x.T, q.T), self.plane is not None, geometry
             )
         b1 = c["b1"]
         b2 = c["b2"]

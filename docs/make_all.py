@@ -130,6 +130,7 @@ PARTS = {
         pictures={"shear.png": "shear.png"},
     ),
     "tilt": Part("docs/draw/tilt.py FOLDER", pictures={"tilt.png": "tilt.png"}),
+    "tilt-scene": Part("-m dem_demo tilt --out FOLDER", quoted_in="validation.md"),
     "slope": Part(
         "-m dem_demo slope --out FOLDER",
         pictures={"slope.png": "final.png", "slope.gif": "motion.gif"},
@@ -146,6 +147,7 @@ PARTS = {
         "-m dem_demo wet-slope --out FOLDER", pictures={"wet-slope.png": "final.png"}
     ),
     "tunnel": Part("-m dem_demo tunnel --out FOLDER", pictures={"tunnel.png": "final.png"}),
+    "shaken-slope-laws": Part("-m dem_demo compare shaken-slope --seeds 1", quoted_in="blocks.md"),
     "shaken-slope": Part(
         "docs/draw/shaken_slope.py FOLDER",
         pictures={"shaken-slope.png": "shaken-slope.png"},

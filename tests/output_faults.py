@@ -39,7 +39,8 @@ OTHER_UNIT = {
 }  # fmt: skip
 # Commands by which a page says where its numbers come from
 COMMAND_ON_PAGE = re.compile(r"docs/make_all\.py|pytest |python -m |`jointlaw \w+ ")
-NUMBER = re.compile(r"(?<![\w.^/\[-])\d[\d_]*(?:\.\d+)?(?=(?:e-?\d+)?(?![\w.]*\w))")
+# 2-D and 2-norm are words
+NUMBER = re.compile(r"(?<![\w.^/\[-])\d[\d_]*(?:\.\d+)?(?=(?:e-?\d+)?(?![\w.]*\w|-[a-zA-Z]))")
 NOT_PROSE = re.compile(r"`[^`]*`|\$[^$]*\$|\]\([^)]*\)|Eq\. [\d, -]+|Figure \d+|<[^>]*>")
 DROP = """
     def _without(table, key, *rest):
@@ -346,12 +347,14 @@ def printed_parts(text):
     for match in re.finditer(r"<!-- ([\w-]+) -->\n(.*?)<!-- end of \1 -->", text, re.DOTALL):
         yield match.span(2)
     outside = re.sub(
-        r"<!-- ([\w-]+) -->\n.*?<!-- end of \1 -->|^```.*?^```$|^    .*$",
-        lambda match: re.sub(r"[^\n]", "\0", match[0]),
+        r"<!-- ([\w-]+) -->\n.*?<!-- end of \1 -->|^```.*?^```$|^    [^\n]*$",
+        lambda match: re.sub(r"[^\n]", " ", match[0]),
         text,
         flags=re.DOTALL | re.MULTILINE,
     )
-    paragraphs = list(re.finditer(r"(?:^.*\S.*$\n?)+", outside, re.MULTILINE))
+    item = r"- |\d+\. "  # of a list: a paragraph of its own
+    pattern = rf"^.*\S.*$\n?(?:^(?!{item}).*\S.*$\n?)*"
+    paragraphs = list(re.finditer(pattern, outside, re.MULTILINE))
     previous = ""
     for paragraph in paragraphs:
         is_table = paragraph[0].startswith("|")

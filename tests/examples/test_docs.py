@@ -164,17 +164,6 @@ def test_readme_reaches_its_first_command_in_90_words_and_one_number():
     assert len(re.findall(r"\d+(?:\.\d+)*", opening)) <= 1
 
 
-def test_every_number_of_the_readme_has_its_command():
-    """The command is in a table of validation.md; versions of Python are not counted."""
-    table = text("docs/validation.md").split("## Numbers of the README")[1].split("##")[0]
-    prose = without_code_and_pictures(text("README.md"))
-    prose = re.sub(r"`[^`]*`|Python [\d.]+", "", prose)
-    with_decimals_or_exponent = r"(?<![\w.])\d+(?:\.\d+|(?=e-?\d))(?:e-?\d+)?"
-    numbers = set(re.findall(with_decimals_or_exponent, prose))
-    assert len(numbers) > 5
-    assert numbers <= set(re.findall(with_decimals_or_exponent, table))
-
-
 def test_pages_cite_the_paper_as_the_citation_file_does():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     cited = [re.search(rf"^    {key}: (\w+)$", citation, re.M)[1] for key in CITATION_KEYS]

@@ -1,11 +1,14 @@
 """Numbers on README and the pages are those that their commands printed.
 
 docs/make_all.py stores what each command printed (docs/data/printed). A table between marks is the
-table there. A paragraph or table that names commands has numbers of their stored outputs or of
-their sources (settings, bounds of tests), rounded to the digits on the page. Which numbers these
-are follows from the pages alone. Slow tests run the commands that take up to `QUICK` again.
+table there. A paragraph that names commands, or a row of a table, has numbers of their stored
+outputs or of the parts of their sources that they run (settings, bounds of tests), rounded to the
+digits on the page. README has numbers of a table of validation.md, which names their commands, or
+of its own code. Which numbers these are follows from the pages alone. Slow tests run the commands
+that take up to `QUICK` again.
 """
 
+import ast
 import re
 import runpy
 from functools import cache
@@ -18,7 +21,12 @@ ROOT = Path(__file__).parents[2]
 MAKE_ALL = runpy.run_path(str(ROOT / "docs" / "make_all.py"))
 PARTS = MAKE_ALL["PARTS"]
 PRINTED = ROOT / "docs" / "data" / "printed"
-SCALES = 1.0, 100.0  # as it is, and in per cent
+README = ROOT / "README.md"
+SCALES = {  # commands print SI units and fractions, too
+    "%": 100.0, "per cent": 100.0, "mm": 1e3, "um": 1e6, "kPa": 1e-3, "MPa": 1e-6, "GPa": 1e-9,
+}  # fmt: skip
+# Other numbers may stand between a number and the unit that they share
+UNIT_BELOW = re.compile(rf"(?:[\d.,\s~-]|and|to|or)*({'|'.join(SCALES)})(?!\w)")
 QUICK = 60  # s of processor time
 ROUNDING = 1e-12  # of numbers that would be zero without rounding
 SLACK = 1e-6  # relative, of half a unit of the last digit
@@ -39,23 +47,99 @@ def marked_tables():
 
 
 def paragraphs_with_commands():
-    """Paragraphs and tables outside marks that name commands: place, text, parts, files of tests.
+    """Paragraphs, and rows of tables, outside marks that name commands: text and their sources.
 
-    A table also has the commands of the paragraph above it.
+    A row without a command has the commands of the paragraph above its table.
     """
     for page in pages():
+        if page == README:
+            continue
         text = page.read_text(encoding="utf-8")
         for start, end in printed_parts(text):
             if text[:start].endswith("-->\n"):
                 continue
             own = text[start:end]
-            above = text[:start].rstrip().rpartition("\n\n")[2] if own.startswith("|") else ""
-            words = " ".join((above + own).split())
-            parts = [name for name in re.findall(r"make_all\.py ([\w-]+)", words) if name in PARTS]
-            tests = re.findall(r"tests/[\w/]+\.py", words)
-            if parts or tests:
-                line = text[:start].count("\n") + 1
-                yield pytest.param(own, parts, tests, id=f"{page.name}:{line}")
+            line = text[:start].count("\n") + 1
+            if not own.startswith("|"):
+                yield from with_sources(own, own, f"{page.name}:{line}")
+                continue
+            above = text[:start].rstrip().rpartition("\n\n")[2]
+            for i, row in enumerate(own.splitlines()):
+                yield from with_sources(row, row, f"{page.name}:{line + i}", otherwise=above)
+
+
+def with_sources(own, words, place, otherwise=""):
+    """A parameter of a test: text, names of parts, and tests, that its commands name, if any."""
+    for where in (words, otherwise):
+        commands = [" ".join(span.split()) for span in re.findall(r"`([^`]*)`", where)]
+        parts = [name for command in commands for name in parts_of(command)]
+        tests = [test for command in commands for test in selected_tests(command)]
+        if parts or tests:
+            yield pytest.param(own, parts, tests, id=place)
+            return
+
+
+def parts_of(command):
+    """Names of the parts of docs/make_all.py that a command makes, or that run it."""
+    if named := re.fullmatch(r"python docs/make_all\.py ([\w -]+)", command):
+        return [name for name in named[1].split() if name in PARTS]
+    command = command.replace("DIR", "FOLDER").removeprefix("python ")
+    return [name for name, part in PARTS.items() if part.command == command]
+
+
+def selected_tests(command):
+    """Pairs of a file of tests that a command names and its words of `-k`."""
+    selected = re.search(r'-k (?:"([^"]*)"|(\w+))', command)
+    expression = selected and (selected[1] or selected[2])
+    words = [word for word in (expression or "").split() if word not in ("and", "or", "not")]
+    return [(file, tuple(words)) for file in re.findall(r"tests/[\w/]+\.py", command)]
+
+
+@cache
+def source_run_by(file, words):
+    """Source of the functions that have one of the words in their name (all if none has), and of
+    everything of the module that they name, with the comments above."""
+    text = (ROOT / file).read_text(encoding="utf-8")
+    lines = text.splitlines()
+    definitions = {}  # lines, and the names in them, by name
+    end = 0
+    functions = []
+    for node in ast.parse(text).body:
+        source = "\n".join(lines[end : node.end_lineno])
+        end = node.end_lineno
+        names = [one for one in ast.walk(node) if isinstance(one, ast.Name)]
+        used = {one.id for one in names}
+        if isinstance(node, ast.FunctionDef):
+            functions.append(node.name)
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            definitions[node.name] = source, used
+        elif isinstance(node, ast.Assign):
+            assigned = [one.id for one in names if isinstance(one.ctx, ast.Store)]
+            definitions |= dict.fromkeys(assigned, (source, used))
+    queue = [name for name in functions if any(word in name for word in words)] or [*definitions]
+    found = {}
+    while queue:
+        name = queue.pop()
+        if name in definitions and name not in found:
+            found[name], used = definitions[name]
+            queue += used
+    return "\n".join(found.values())
+
+
+@cache
+def source_of_part(name):
+    """Source of the command of a part, as far as its subcommand runs it, and of the tests that it
+    runs."""
+    script, *words = PARTS[name].command.split()
+    if not script.startswith("docs/"):
+        return ""
+    subcommand = words[0].replace("-", "_") if words else ""
+    source = source_run_by(script, (subcommand,) if subcommand.islower() else ())
+    names = re.findall(r'"(\w+\.py)\b', source)
+    files = [
+        file for name in names if (ROOT / (file := f"tests/verification/test_{name}")).exists()
+    ]
+    return "\n".join([source, *(source_run_by(file, ()) for file in files)])
 
 
 @cache
@@ -66,13 +150,31 @@ def numbers_of(text):
     return frozenset(float(number.replace("_", "").replace(" ", "")) for number in found)
 
 
-def has_number(values, number, exponent):
-    """Whether one of the values, rounded to the digits of the number as written, is the number."""
+def has_number(values, number, exponent, scales, rounding=0.5):
+    """Whether one of the values, by one of the scales, is the number.
+
+    rounding: largest difference in units of the last digit of the number.
+    """
     unit = 10.0 ** (int(exponent[1:] or 0) - len(number.partition(".")[2]))
     value = float(number + exponent)
     return any(
-        abs(scale * one - value) <= (0.5 + SLACK) * unit for one in values for scale in SCALES
+        abs(scale * one - value) <= (rounding + SLACK) * unit for one in values for scale in scales
     )
+
+
+def numbers_in_prose(text):
+    """Numbers of a text, without code and formulas: digits, exponent, and the values in the output
+    of a command over the number.
+
+    Small whole numbers (two laws) are words.
+    """
+    prose = NOT_PROSE.sub(lambda match: " " * len(match[0]), text)
+    prose = re.sub(r"(?<=\d) (?=\d{3}\b)", "_", prose)  # digits in groups of three
+    for match in NUMBER.finditer(prose):
+        exponent = re.match(r"(?:e-?\d+)?", prose[match.end() :])[0]
+        if len(match[0]) > 1 or exponent:
+            unit = UNIT_BELOW.match(prose[match.end() + len(exponent) :])
+            yield match[0], exponent, (1.0, SCALES[unit[1]]) if unit else (1.0,)
 
 
 PARAGRAPHS = [*paragraphs_with_commands()]
@@ -89,21 +191,36 @@ def test_numbers_are_of_the_outputs_of_their_commands(text, parts, tests):
     missing = [name for name in parts if not stored(name)]
     if missing:
         pytest.skip(f"not stored yet: python docs/make_all.py {' '.join(missing)}")
-    sources = [stored(name) + PARTS[name].command for name in parts]
-    scripts = [PARTS[name].command.split()[0] for name in parts]
-    files = [*tests, *(script for script in scripts if script.startswith("docs/"))]
-    sources += [(ROOT / file).read_text(encoding="utf-8") for file in files]
-    values = numbers_of("\n".join(sources))
-    prose = NOT_PROSE.sub(lambda match: " " * len(match[0]), text)
-    # Digits in groups of three, and small whole numbers (two laws), which are words
-    prose = re.sub(r"(?<=\d) (?=\d{3}\b)", "_", prose)
-    absent = []
-    for match in NUMBER.finditer(prose):
-        exponent = re.match(r"(?:e-?\d+)?", prose[match.end() :])[0]
-        is_word = len(match[0]) == 1 and not exponent
-        if not is_word and not has_number(values, match[0], exponent):
-            absent.append(match[0] + exponent)
+    printed = numbers_of("\n".join(stored(name) for name in parts))
+    sources = [PARTS[name].command + source_of_part(name) for name in parts]
+    settings = numbers_of("\n".join(sources + [source_run_by(*test) for test in tests]))
+    absent = [
+        number + exponent
+        for number, exponent, scales in numbers_in_prose(text)
+        if not has_number(printed, number, exponent, scales)
+        and not has_number(settings, number, exponent, scales, rounding=0.0)
+    ]
     assert absent == []
+
+
+def test_numbers_of_the_readme_have_a_command():
+    """They are in a table of validation.md, whose rows are compared with their commands.
+
+    Quantities of its own code, the oldest Python and the citation need none.
+    """
+    text = README.read_text(encoding="utf-8")
+    code = re.findall(r"^```.*?^```$", text, re.DOTALL | re.MULTILINE)
+    validation = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+    table = validation.split("## Numbers of the README")[1].split("\n## ")[0]
+    rows = [line for line in table.splitlines() if line.startswith("|")]
+    named = " ".join(row.split("|")[1] for row in rows)
+    settings = re.findall(r"\d+(?:\.\d+)?(?=[a-zA-Z])", "\n".join(code))
+    others = (ROOT / "pyproject.toml").read_text() + (ROOT / "CITATION.cff").read_text()
+    others = re.findall(r"^requires-python.*$|^ +(?:volume|year):.*$", others, re.MULTILINE)
+    values = numbers_of("\n".join([*settings, named, *others]))
+    for start, end in printed_parts(text):
+        for number, exponent, _ in numbers_in_prose(text[start:end]):
+            assert float(number + exponent) in values, number + exponent
 
 
 QUICK_PARTS = [

@@ -35,6 +35,7 @@
 
 enum {
   MAX_CORNERS = 128, /* of two faces together */
+  MAX_FACE_PAIRS = 64, /* in contact, of two blocks */
   TOO_MANY_CORNERS = -1
 };
 
@@ -471,10 +472,11 @@ static int corner_of_plane(const raised_face *f, double (*edges)[2], int m_edges
 
 /* Contact points of face f of one block with face g of another, in whose plane they are clipped,
  * written from point `count` on. f_is_of_a: whether f belongs to the block with the lower number;
- * strip (m): width at an edge. Returns how many there are, or TOO_MANY_CORNERS. */
+ * strip (m): width at an edge; height (m): of the lowest point of the overlap over the plane. Returns
+ * how many there are, or TOO_MANY_CORNERS. */
 static long long touch(const dem_solids *s, long long f, long long g, int f_is_of_a, double max_gap,
                        double max_depth, double tie, double strip, long long count,
-                       const dem_points *out)
+                       const dem_points *out, double *height)
 {
   const double *normal = s->normal + 3 * g;
   const long long *ring = s->corner + s->first_corner[g], *ring_f = s->corner + s->first_corner[f];
@@ -506,6 +508,7 @@ static long long touch(const dem_solids *s, long long f, long long g, int f_is_o
   const double fade = DEM_FADE_PER_GAP * max_gap;
   overlap found;
   find_overlap(&face, edges, m_g, tie, strip, fade, &found);
+  *height = found.lowest;
   if (!(found.lowest < max_gap && found.lowest > -max_depth)) return 0;
   const int is_flush = !(hypot(face.normal[0], face.normal[1]) > DEM_FLUSH_SINE);
   for (int i = 0; i < found.m; i++) {
@@ -689,7 +692,66 @@ static long long touch_at_edges(const dem_solids *s, long long a, long long b, d
   const double *normal = s->normal + 3 * plane;
   const double down[3] = {-normal[0], -normal[1], -normal[2]};
   const long long face = face_at(s, block[1 - side], vertex, vertex, down);
-  return touch(s, face, plane, side, max_gap, max_depth, tie, strip, count, out);
+  double height;
+  return touch(s, face, plane, side, max_gap, max_depth, tie, strip, count, out, &height);
+}
+
+/* The contacts of two blocks, face on face, found so far */
+typedef struct {
+  int n;
+  long long first[MAX_FACE_PAIRS], end[MAX_FACE_PAIRS]; /* their points */
+  double height[MAX_FACE_PAIRS], normal[MAX_FACE_PAIRS][3]; /* of the lowest point; of the plane */
+} face_pairs;
+
+/* Remove points `first` to `end` of the `count` points that are written */
+static void remove_points(const dem_points *out, long long first, long long end, long long count)
+{
+  const long long last = count < out->capacity ? count : out->capacity;
+  if (end >= last) return;
+  const size_t n = (size_t) (last - end);
+  memmove(out->face_a + first, out->face_a + end, n * sizeof *out->face_a);
+  memmove(out->face_b + first, out->face_b + end, n * sizeof *out->face_b);
+  memmove(out->plane_is_of_a + first, out->plane_is_of_a + end, n * sizeof *out->plane_is_of_a);
+  memmove(out->area + first, out->area + end, n * sizeof *out->area);
+  memmove(out->point + 3 * first, out->point + 3 * end, 3 * n * sizeof *out->point);
+  memmove(out->normal + 3 * first, out->normal + 3 * end, 3 * n * sizeof *out->normal);
+  memmove(out->base + 3 * first, out->base + 3 * end, 3 * n * sizeof *out->base);
+  memmove(out->area_rate + 6 * first, out->area_rate + 6 * end, 6 * n * sizeof *out->area_rate);
+}
+
+/* Add a contact of `found` points from `count` on to the contacts of two convex blocks, and keep those
+ * along whose normals the blocks overlap least: convex blocks touch in one plane. A block that slides
+ * over the seam of its bed is a closure below the top of the next block, which it has passed with its
+ * front: without this choice it would bear on the side of that block.
+ *
+ * Contacts whose normals differ by less than 4 degrees, as of a face of several facets, are all kept.
+ * Returns how many points there are, or TOO_MANY_CORNERS. */
+static long long add_face_pair(face_pairs *kept, const double *normal, double height, long long count,
+                               long long found, const dem_points *out)
+{
+  const double min_cosine = 1.0 - 2.0 * DEM_FLUSH_SINE * DEM_FLUSH_SINE;
+  for (int i = 0; i < kept->n; i++)
+    if (dot(kept->normal[i], normal) < min_cosine && kept->height[i] >= height) return count;
+  long long end = count + found;
+  for (int i = kept->n - 1; i >= 0; i--) {
+    if (dot(kept->normal[i], normal) >= min_cosine) continue;
+    const long long points = kept->end[i] - kept->first[i];
+    remove_points(out, kept->first[i], kept->end[i], end);
+    end -= points;
+    for (int j = i; j + 1 < kept->n; j++) {
+      kept->first[j] = kept->first[j + 1] - points;
+      kept->end[j] = kept->end[j + 1] - points;
+      kept->height[j] = kept->height[j + 1];
+      memcpy(kept->normal[j], kept->normal[j + 1], sizeof kept->normal[j]);
+    }
+    kept->n--;
+  }
+  if (kept->n == MAX_FACE_PAIRS) return TOO_MANY_CORNERS;
+  kept->first[kept->n] = end - found;
+  kept->end[kept->n] = end;
+  kept->height[kept->n] = height;
+  memcpy(kept->normal[kept->n++], normal, 3 * sizeof *normal);
+  return end;
 }
 
 /* Contact points of pairs (p, 2) of blocks, the lower number first.
@@ -706,13 +768,17 @@ EXPORT long long dem_face_contacts(const dem_solids *s, long long p, const long 
   long long count = 0;
   for (long long i = 0; i < p; i++) {
     const long long a = pairs[2 * i], b = pairs[2 * i + 1], before = count;
+    face_pairs kept = {.n = 0};
     for (long long f = s->first_face[a]; f < s->first_face[a + 1]; f++)
       for (long long g = s->first_face[b]; g < s->first_face[b + 1]; g++) {
         if (dot(s->normal + 3 * f, s->normal + 3 * g) > max_cosine) continue;
+        double height;
         const long long found =
-            touch(s, f, g, 1, max_gap[i], max_depth[i], tie[i], strip[i], count, out);
+            touch(s, f, g, 1, max_gap[i], max_depth[i], tie[i], strip[i], count, out, &height);
         if (found == TOO_MANY_CORNERS) return found;
-        count += found;
+        if (found == 0) continue;
+        count = add_face_pair(&kept, s->normal + 3 * g, height, count, found, out);
+        if (count == TOO_MANY_CORNERS) return count;
       }
     if (count > before) continue;
     const long long found =

@@ -151,6 +151,20 @@ def test_the_number_of_points_does_not_depend_on_rounding():
         assert points.area == pytest.approx([4.0] * 4, rel=1e-6)
 
 
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_block_past_the_seam_of_its_bed_bears_on_the_top_of_the_next_block(order):
+    """It is 2e-5 m deep, and its front 3 mm behind the side of the next block: no contact with
+    this side."""
+    next_bed = box([2.0, 4.0, 1.0], [3.0, 0.0, -0.5])
+    slider = box([1.0, 1.0, 1.0], [1.503, 0.1, 0.5 - 2e-5])
+    _, points = contacts_of(*[(next_bed, slider), (slider, next_bed)][order])
+    assert len(points.area) == 4
+    assert np.abs(points.normal[:, 2]) == pytest.approx([1.0] * 4)
+    assert points.closure == pytest.approx([2e-5] * 4, rel=1e-9)
+    assert points.area.sum() == pytest.approx(3e-3, rel=1e-9)
+    assert (points.point[:, 0] < 2.0031).all()
+
+
 def test_contacts_of_a_cut_rock_cover_all_joints():
     """Each joint face has one face, or several, on the other side."""
     sets = [

@@ -171,9 +171,11 @@ def test_a_block_at_rest_veers_most_in_its_first_slip():
     assert [azimuth, first, later] == pytest.approx([43.2, 43.2, 43.1], abs=0.3)
 
 
-@pytest.mark.parametrize("cuts", [(0.9,), pytest.param((0.31, 0.83, 1.4), marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("cuts", "end"), [((0.6,), 0.42), pytest.param((0.31, 0.63, 1.4), 0.6, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("rough", [False, True], ids=["coulomb", "rough"])
-def test_block_that_crosses_joints_of_its_bed(rough, cuts):
+def test_block_that_crosses_joints_of_its_bed(rough, cuts, end):
     """A block that slides obliquely over the seams of its bed, beside the same on one plate.
 
     Coulomb: the same path. A rough block keeps its dilation over a seam that it reaches in the run.
@@ -185,19 +187,19 @@ def test_block_that_crosses_joints_of_its_bed(rough, cuts):
         ends = [-2.0, *edges, 8.0]
         bed = list(pairwise(ends))
         run = "fraction = 0.15\n"
-        text = block_on_bed(gravity, law, 0.6, (1.0, 1.0, 0.3), bed, run)
+        text = block_on_bed(gravity, law, end, (1.0, 1.0, 0.3), bed, run)
         sim = SpaceSimulation(parse(f"rough = 0.0\n{text}"))
         start = sim.blocks.motion[:3, -1].copy()
-        run_to(sim, 0.6)
+        run_to(sim, end)
         path = sim.blocks.motion[:3, -1] - start
         paths.append(path / sim.time**2)
         lifts.append(path[2])
         assert abs(sim.energy_balance.error) < 1e-4
-        assert path[0] > 0.2
+        assert any(0.5 < cut < 0.5 + path[0] for cut in cuts)  # the block reaches a seam
     difference = np.linalg.norm(paths[1] - paths[0]) / np.linalg.norm(paths[0])
     if not rough:
         assert difference < 1e-4
-    elif cuts == (0.9,):
+    elif cuts == (0.6,):
         assert difference < 1e-3
         assert lifts[1] == pytest.approx(lifts[0], rel=2e-2)
 

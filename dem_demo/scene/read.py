@@ -1,9 +1,11 @@
 """Read scenes from TOML files or text, and validate them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -39,17 +41,18 @@ MAX_BLOCKS = 1e5  # of a scene: cutting and contact detection take hours beyond
 MIN_WIDTH_PER_SPACING = 0.2  # of the smallest spacing: narrower blocks of a rock are slivers
 
 
-def shipped() -> dict[str, tuple[Path, str]]:
+@cache
+def shipped() -> Mapping[str, tuple[Path, str]]:
     """List the scenes of the package: SCENE, and SCENE-VARIANT for each of its variants.
 
-    Returns by name the file, and the line that chooses the variant.
+    Returns by name the file, and the line that chooses the variant. A process reads the files once.
     """
     scenes = {}
     for path in sorted(SCENES.glob("*.toml")):
         scenes[path.stem] = path, ""
         for variant in keys.read(path).get("variants", {}):
             scenes[f"{path.stem}-{variant}"] = path, f'variant = "{variant}"\n'
-    return scenes
+    return MappingProxyType(scenes)
 
 
 def read_source(source: str | Path) -> tuple[str, str, Files]:

@@ -224,6 +224,12 @@ def convex_hull(points: np.ndarray) -> Solid:
 def _without_straight_corners(points, ring: tuple[int, ...], tolerance: float) -> tuple[int, ...]:
     """The ring without vertices that lie on the line between their neighbours, up to `tolerance`
     (m)."""
+    at = points[[*ring]]
+    before = np.roll(at, 1, axis=0)
+    chords = np.roll(at, -1, axis=0) - before
+    areas = np.linalg.norm(np.cross(chords, at - before), axis=1)
+    if (areas > tolerance * np.linalg.norm(chords, axis=1)).all():
+        return ring
     kept = [*ring]
     i = 0
     while i < len(kept):

@@ -349,18 +349,24 @@ def _working_terms(test: LinearTest, hyperparameters: Hyperparameters) -> tuple[
     return M, v
 
 
-def _correlate(rows: Array, rho: float) -> Array:
-    """The product R rows, where R_ij = rho^|i - j| is the correlation matrix of rows (n, ...)."""
-    index = np.arange(rows.shape[0])
-    R = rho ** np.abs(np.subtract.outer(index, index)) if rho else np.eye(index.size)
-    return np.asarray(R @ rows)
+def _correlate(rows: Array, rho: Array) -> Array:
+    """The products R rows, where R_ij = rho^|i - j| is the correlation matrix of rows (P, n, p) at
+    P points with rho (P,)."""
+    index = np.arange(rows.shape[1])
+    correlated = rows.copy()
+    for value in np.unique(rho[rho != 0.0]):
+        has_value = rho == value
+        R = value ** np.abs(np.subtract.outer(index, index))
+        correlated[has_value] = R @ rows[has_value]
+    return correlated
 
 
-def _decorrelate(rows: Array, rho: float) -> Array:
-    """Rows (n, ...) with the correlation rho^|i - j|, transformed to independent rows."""
+def _decorrelate(rows: Array, rho: Array) -> Array:
+    """Rows (P, n, p) with the correlations rho^|i - j|, rho (P,), as independent rows."""
+    rho = rho[:, None, None]
     independent = rows.copy()
-    independent[1:] -= rho * rows[:-1]
-    independent[1:] /= np.sqrt(1 - rho**2)
+    independent[:, 1:] -= rho * rows[:, :-1]
+    independent[:, 1:] /= np.sqrt(1 - rho**2)
     return independent
 
 
@@ -386,34 +392,35 @@ def _sum_series(test: LinearTest, grid: "_Grid") -> _TestTerms:
     total: list[Any] = [0.0] * len(_TestTerms._fields)
     for series, residual, J in zip(*test, strict=True):
         axes = grid.axes_of(series)
-        points = []
-        for point in product(*(grid.values[axis] for axis in axes)):
-            hyperparameters = grid.hyperparameters(axes, point)
-            points.append(_series_terms(series, residual, J, hyperparameters))
-        placed = [grid.place(axes, np.array(column)) for column in zip(*points, strict=True)]
-        total = [sum_ + term for sum_, term in zip(total, placed, strict=True)]
+        points = [
+            grid.hyperparameters(axes, point)
+            for point in product(*(grid.values[axis] for axis in axes))
+        ]
+        terms = _series_terms(series, residual, J, points)
+        total = [sum_ + grid.place(axes, term) for sum_, term in zip(total, terms, strict=True)]
     return _TestTerms(*total)
 
 
 def _series_terms(
-    series: Series, residual: Array, J: Array, hyperparameters: Hyperparameters
+    series: Series, residual: Array, J: Array, points: Sequence[Hyperparameters]
 ) -> _TestTerms:
-    """The terms of one series for given hyperparameters."""
-    sigma = series.sigma(hyperparameters.levels)
-    rho = hyperparameters.autocorrelation.get(series.test, 0.0)
-    z = residual / sigma
-    H = J / sigma[:, None]
-    white_z = _decorrelate(z, rho)
-    white_H = _decorrelate(H, rho)
-    log_determinant = 2 * np.sum(np.log(sigma)) + (z.size - 1) * np.log(1 - rho**2)
+    """The terms of one series for the hyperparameters of P points, (P, ...) each."""
+    sigma = np.array([series.sigma(point.levels) for point in points])
+    rho = np.array([point.autocorrelation.get(series.test, 0.0) for point in points])
+    p = J.shape[1]
+    rows = np.column_stack([J, residual]) / sigma[..., None]
+    white_rows = _decorrelate(rows, rho)
+    products = np.swapaxes(white_rows, 1, 2) @ white_rows
+    working_products = np.swapaxes(rows, 1, 2) @ rows
+    H = rows[..., :p]
     return _TestTerms(
-        M=white_H.T @ white_H,
-        v=white_H.T @ white_z,
-        q=white_z @ white_z,
-        log_determinant=log_determinant,
-        working_M=H.T @ H,
-        working_v=H.T @ z,
-        G=H.T @ _correlate(H, rho),
+        M=products[:, :p, :p],
+        v=products[:, :p, p],
+        q=products[:, p, p],
+        log_determinant=2 * np.log(sigma).sum(axis=1) + (len(residual) - 1) * np.log(1 - rho**2),
+        working_M=working_products[:, :p, :p],
+        working_v=working_products[:, :p, p],
+        G=np.swapaxes(H, 1, 2) @ _correlate(H, rho),
     )
 
 

@@ -13,7 +13,8 @@ from .first_loading_curve import FirstLoadingCurve
 
 _MAX_YIELD_INTERFERENCES = 1e8  # then Phi less its value one interference earlier has 8 digits
 _MIN_FLOAT = sys.float_info.min
-_BISECTIONS = 63  # of all floats in log closure: to rounding
+_BITS_OF_LOG = 65  # halvings of the bracket of all floats in log closure: to rounding
+_MAX_FEW = 100  # closures: numpy evaluates 32 times as many in the time of a few calls
 _MAX_FORCE = 1e150  # Phi whose stress counts as infinite
 QUADRATURE_NODES = 8  # of the mean of the sines of degrading facets, as in native/host.h
 
@@ -116,10 +117,10 @@ class DegradingFacets(NamedTuple):
 def find_closure(
     stress_at: Callable[[Array], Array], stress: Array, max_search_closure: float
 ) -> Array:
-    """Closures (m) at normal stresses (Pa), by bisection of the logarithm of the closure.
+    """Closures (m) at normal stresses (Pa), by division of brackets of their logarithms.
 
-    stress_at: normal stress at closures, increasing; max_search_closure: upper end of the search.
-    Exact to rounding. Raises ValueError where no closure reaches a stress.
+    stress_at: normal stress at closures (...), increasing; max_search_closure: upper end of the
+    search. Exact to rounding. Raises ValueError where no closure reaches a stress.
     """
     closure = np.zeros_like(stress)
     target = stress[stress >= _MIN_FLOAT]
@@ -130,11 +131,15 @@ def find_closure(
         if is_out_of_range.any():
             smallest = target[is_out_of_range].min()
             raise ValueError(f"normal_stress = {smallest:g} Pa is beyond any closure")
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            is_short = stress_at(np.exp(middle)) < target
-            low = np.where(is_short, middle, low)
-            high = np.where(is_short, high, middle)
+        bits = 5 if target.size <= _MAX_FEW else 1  # that an iteration adds
+        fractions = np.arange(1, 2**bits)[:, None] / 2**bits
+        for _ in range(_BITS_OF_LOG // bits):
+            inner = low + fractions * (high - low)
+            is_short = stress_at(np.exp(inner)) < target
+            first_long = np.where(is_short.all(axis=0), len(inner), is_short.argmin(axis=0))
+            bracket = np.concatenate([[low], inner, [high]])
+            low = np.take_along_axis(bracket, first_long[None], 0)[0]
+            high = np.take_along_axis(bracket, first_long[None] + 1, 0)[0]
     closure[stress >= _MIN_FLOAT] = np.exp(high)
     return closure
 

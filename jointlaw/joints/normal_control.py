@@ -57,11 +57,12 @@ def closing_increments(
         high = np.where(residual <= 0, high, u)
         resolution = _RELATIVE_RESOLUTION * np.maximum(np.abs(closure + u), size)
         is_narrow = high - low <= resolution
+        if (is_met | is_narrow).all():
+            u[:] = np.where(is_met, u, high)
+            return u
         slope = condition.spring + C[:, 0, 0]
         guess = _next_guess(u, residual, slope, (low, high), stride, resolution)
         u[:] = np.where(is_met, u, np.where(is_narrow, high, guess))
-        if (is_met | is_narrow).all():
-            return u
         stride = np.where(np.isinf(high - low), 2.0 * stride, stride)
     joint = int(np.argmin(is_met | is_narrow))
     stress = np.broadcast_to(condition.stress, u.shape)[joint]

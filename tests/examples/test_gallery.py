@@ -52,16 +52,22 @@ def test_docstrings_name_arguments_and_errors(name):
     assert inspect.isclass(thing) or not checks_input or re.search(r"\b[Rr]aises\b", docstring)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_examples_of_docstrings_run(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def variables():
+    """What the examples of docstrings use, but for a joint."""
     law = jl.presets.load("westerly-smooth")
     sheared = jl.direct_shear(law.joint(), 1e-6, normal=5e6)
-    variables = {
-        "jl": jl, "np": np, "replace": replace, "law": law, "joint": law.joint(),
+    return {
+        "jl": jl, "np": np, "replace": replace, "law": law,
         "record": jl.closure_test(law.joint(), 5e6), "sheared": sheared,
         "curve": jl.ShearCurve(sheared.shear[1:], sheared.shear_stress[1:], 5e6),
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_examples_of_docstrings_run(name, variables, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    variables = variables | {"joint": variables["law"].joint()}
     tests = doctest.DocTestFinder().find(NAMES[name], name, globs=variables)
     assert name in WITHOUT_EXAMPLE or any(test.examples for test in tests)
     assert not any(doctest.DocTestRunner().run(test).failed for test in tests)

@@ -22,10 +22,12 @@ import jointlaw as jl
 import jointlaw.cli.field
 import jointlaw.cli.fit
 import jointlaw.cli.main
+import jointlaw.cli.scan
 from dem_demo.output.pictures import Pictures
 from jointlaw.cli.command import Group
 from jointlaw.hosts import HOSTS
 from jointlaw.surface.fit import SurfaceFit
+from jointlaw.tables.joint_table import JointTable
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SHEAR = "--to 1um --steps 3"
@@ -39,6 +41,8 @@ FIELD = {
     "normal-stiffness": ("30GPa/m", "40GPa/m"),
 }
 FIELD_LINE = "field " + " ".join(f"--{name} {value}" for name, (value, _) in FIELD.items())
+# without its law: the values of the line are reported
+FIELD_REPORT = FIELD_LINE + " --out report"
 FILE_FIT = "fit table.csv"
 REAL_FIT = "fit table.csv --free asperity_density"
 FLOW_FIT = "fit table.csv --cycle --flow flow.csv"
@@ -127,11 +131,11 @@ PROBES = {
     },
     "field": {
         **{
-            f"--{name}": (FIELD_LINE, FIELD_LINE.replace(f"--{name} {value}", f"--{name} {other}"))
+            f"--{name}": (FIELD_REPORT, FIELD_REPORT.replace(f"{name} {value}", f"{name} {other}"))
             for name, (value, other) in FIELD.items()
         },
-        "--basic-friction": (FIELD_LINE, "--basic-friction 35deg"),
-        "--degradation": (FIELD_LINE, "--degradation stress"),
+        "--basic-friction": (FIELD_REPORT, "--basic-friction 35deg"),
+        "--degradation": (FIELD_REPORT, "--degradation stress"),
     },
     **{f"export {host}": {} for host in HOSTS},
 }
@@ -204,6 +208,7 @@ TIMES = (
 )
 REFUSALS = ("called with", "the fitted a = ")  # of work that is replaced; of heights in nm
 FROM_FIELD = cache(jointlaw.cli.field.from_field)
+SHEAR_PAST_PEAK = cache(jointlaw.cli.field.shear_past_peak)
 PRESENT = {}  # outcomes of lines without an option
 
 
@@ -301,6 +306,11 @@ def report_scene(scene, *arguments):
     report(scene.title, *arguments)
 
 
+def angle_of_slopes(joint, *arguments, **keywords):
+    """In place of a shear test of a scanned surface: an angle that depends on its slopes."""
+    return Mock(peak_friction_angle=90.0 / joint.law.orientation.a)
+
+
 def row_of(scene, *arguments):
     """In place of a strength reduction: one row that names the arguments."""
     yield {"rock": f"{scene.title} {flat(arguments[:3])}"}
@@ -393,7 +403,9 @@ def outcome(tmp_path, monkeypatch, capsys, states, real_fit):
         monkeypatch.setattr(Pictures, picture, empty)
     monkeypatch.setattr(Pictures, "estimate_time", lambda self, frames: 60.0)
     monkeypatch.setattr(jointlaw.cli.fit, "fit_flow", report)
-    monkeypatch.setattr(jointlaw.cli.field, "from_field", FROM_FIELD)
+    monkeypatch.setattr(jointlaw.cli.field, "shear_past_peak", SHEAR_PAST_PEAK)
+    monkeypatch.setattr(jointlaw.cli.scan, "direct_shear", angle_of_slopes)
+    monkeypatch.setattr(JointTable, "report", lambda self, law: {})
     monkeypatch.setattr(dem_demo.cli.ablate, "ablate", report_scene)
     monkeypatch.setattr(dem_demo.cli.compare, "compare", report_scene)
     monkeypatch.setattr(dem_demo.cli.strength, "strength_reduction", row_of)
@@ -416,6 +428,8 @@ def outcome(tmp_path, monkeypatch, capsys, states, real_fit):
         elif "--flow " in line:
             fit = lambda *arguments, **keywords: NO_FIT  # noqa: E731
         monkeypatch.setattr(jointlaw.cli.fit, "fit_curves", fit)
+        law_of_field = report if "--out report" in line else FROM_FIELD
+        monkeypatch.setattr(jointlaw.cli.field, "from_field", law_of_field)
         status = main(shlex.split(line))
         written = {}
         for path in sorted({*folder.rglob("*")} - before):

@@ -104,7 +104,7 @@ def test_yield_interference_from_shear_alone(law):
 def test_band_of_an_opening_is_finite(law):
     """Three points without an opening: the band is linear, of the size of the displacement."""
     curve = ShearCurve([0.0, 1e-3, 1e-2], [0.0, 1.3e6, 0.9e6], 1e6)
-    start = replace(law, mating_length=5e-3)
+    start = replace(law, mating_length=5e-3, plane=0.0)
     fit = jl.fit_curves([curve], law=start, free=("mu", "a", "mating_length"))
     low, high = fit.shear_band(curve)[1]
     (test,) = fit.predict_shear(curve)

@@ -201,6 +201,12 @@ def simulations():
 
 
 @pytest.fixture(scope="module")
+def new_states(simulations):
+    """For each scene the state of a new simulation."""
+    return {name: new_simulation(sim.scene).state() for name, (sim, _) in simulations.items()}
+
+
+@pytest.fixture(scope="module")
 def expected(simulations, tmp_path_factory):
     """Outcome of the resumed run of each scene."""
     return {
@@ -246,8 +252,10 @@ def entries():
     yield from ((SpaceSimulation, name) for name in in_space if name not in in_plane)
 
 
-def left_out(name, sim):
+def left_out(name, sim, new_state):
     """The saved state without an entry: (state, whether the entry is not as in a new simulation).
+
+    new_state: the state of a new simulation of the scene.
 
     In its place is the entry of a new simulation if that differs and is of the same shape; else
     zeros, or ones where all are zero. None for an entry that the state lacks.
@@ -265,7 +273,7 @@ def left_out(name, sim):
         value = value.copy()
         value[first : first + tables.row_counts[row]] = 0.0
         return saved | {key: value}, not np.array_equal(value, saved[key])
-    start = new_simulation(sim.scene).state()[key]
+    start = new_state[key].copy()
     zeros = np.zeros_like(value)
     if start.shape != value.shape and value.any():
         return saved | {key: zeros}, True
@@ -282,10 +290,14 @@ def left_out(name, sim):
 
 
 @pytest.mark.parametrize(("kind", "name"), [*entries()])
-def test_every_entry_of_a_saved_state_matters(kind, name, simulations, expected, tmp_path):
+def test_every_entry_of_a_saved_state_matters(
+    kind, name, simulations, new_states, expected, tmp_path
+):
     """In one of the scenes where the entry is not as in a new simulation."""
     states = {
-        scene: left_out(name, sim) for scene, (sim, _) in simulations.items() if type(sim) is kind
+        scene: left_out(name, sim, new_states[scene])
+        for scene, (sim, _) in simulations.items()
+        if type(sim) is kind
     }
     states = {scene: result for scene, result in states.items() if result}
     new = {scene: result for scene, result in states.items() if result[1]}

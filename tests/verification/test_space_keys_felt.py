@@ -5,12 +5,14 @@ As `test_keys_felt.py` for the plane. A key without a probe fails `test_every_ke
 
 import json
 import re
+from functools import cache
 
 import pytest
 from test_keys_felt import changed, key_paths
 
-from dem_demo.cli import main
+import dem_demo.cli
 from dem_demo.space.keys import SCENE
+from dem_demo.space.read import load
 
 REFUSED = "not there yet for blocks in space"
 PLAIN = {"kind": "coulomb", "normal_stiffness": 1e9, "shear_stiffness": 5e8, "friction": 0.3}
@@ -325,8 +327,11 @@ def outcome(tables, folder, capsys):
         (folder / name).write_text(text)
     scene = folder / "scene.toml"
     scene.write_text("".join(f"{key} = {toml(value)}\n" for key, value in tables.items()))
-    status = main(["check", str(scene)])
-    main(["run", str(scene), "--no-pictures", "--vtk", "--out", str(folder / "out")])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dem_demo.cli, "load", cache(load))  # of both commands
+        status = dem_demo.cli.main(["check", str(scene)])
+        results = str(folder / "out")
+        dem_demo.cli.main(["run", str(scene), "--no-pictures", "--vtk", "--out", results])
     texts = {
         path.relative_to(folder).as_posix(): re.sub('"wall_time_s": .*', "", path.read_text())
         for path in sorted((folder / "out").rglob("*"))

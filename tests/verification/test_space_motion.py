@@ -259,15 +259,15 @@ def driven(drive, end, load=(0.0, 0.0, 0.0), more="", tilt=0.0):
 
 
 def test_base_that_tilts_lets_a_slab_slip_at_its_friction_angle():
-    """A drive rotates a base that dips at 30 degrees further about y; the slab slips at 30.964
+    """A drive rotates a base that dips at 30.5 degrees further about y; the slab slips at 30.964
     degrees and a little later, as the base goes on."""
     drive = '[[drive]]\nblock = "base"\nmotion = "turn_y"\n'
-    sim = driven(f"{drive}times = [0, 0.25]\nvalues = [0, 2]\n", 0.25, tilt=30.0)
+    sim = driven(f"{drive}times = [0, 0.12]\nvalues = [0, 1]\n", 0.12, tilt=30.5)
     angle = 0.0
-    while sim.shear_displacement(1, 0) < 1e-5 and sim.time < 0.25:
+    while sim.shear_displacement(1, 0) < 1e-5 and sim.time < 0.12:
         sim.step()
         turned = sim.blocks.axes[0] @ sim.initial_axes[0].T
-        angle = 30.0 + np.degrees(np.arctan2(turned[0, 2], turned[2, 2]))
+        angle = 30.5 + np.degrees(np.arctan2(turned[0, 2], turned[2, 2]))
     assert np.degrees(np.arctan(FRICTION)) - 0.03 < angle < 31.3
     assert turned[1] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
     assert abs(sim.energy_balance.error) < 1e-5
@@ -276,21 +276,22 @@ def test_base_that_tilts_lets_a_slab_slip_at_its_friction_angle():
 def test_shaken_base_displaces_a_slab_as_newmark_s_block():
     """A sine of 8 m/s2 along x, more than the friction of 5.89 m/s2: the slab slides as a rigid
     block on a rigid base with Coulomb friction."""
-    sine = "sine = { acceleration = 8.0, frequency = 2.0, cycles = 2 }\n"
-    sim = driven(f'[[drive]]\nmotion = "x"\n{sine}', 0.8)
+    end = 0.35
+    sine = "sine = { acceleration = 8.0, frequency = 4.0, cycles = 1 }\n"
+    sim = driven(f'[[drive]]\nmotion = "x"\n{sine}', end)
     start = sim.blocks.motion[:2].copy()
     base = sim.scene.drives[0]
     limit = FRICTION * GRAVITY
-    dt = 1e-4
+    dt = 2e-5
     velocity = 0.0
     relative = 0.0
-    for i in range(round(0.8 / dt)):
+    for i in range(round(end / dt)):
         of_base = (base((i + 1) * dt) - base(i * dt)) / dt
         velocity += np.clip(of_base - velocity, -limit * dt, limit * dt)
         relative += (velocity - of_base) * dt
-    run_to(sim, 0.8)
+    run_to(sim, end)
     slid = (sim.blocks.motion[0] - start[0]) @ [-1.0, 1.0]
-    assert relative < -0.01
+    assert relative < -2e-3
     assert slid == pytest.approx(relative, rel=5e-3)
     assert abs(sim.energy_balance.error) < 1e-4
 
@@ -299,19 +300,20 @@ def test_constant_force_and_constant_velocity():
     """A load beyond friction accelerates the slab; a drive that pulls it at a constant velocity
     does the work of friction."""
     mass = 2600.0 * 0.08
-    sim = driven("", 0.3, load=[0.8 * mass * GRAVITY, 0.0, 0.0])
+    sim = driven("", 0.15, load=[0.8 * mass * GRAVITY, 0.0, 0.0])
     start = sim.blocks.motion[0, 1]
-    run_to(sim, 0.3)
+    run_to(sim, 0.15)
     expected = 0.5 * (0.8 - FRICTION) * GRAVITY * sim.time**2
     assert sim.blocks.motion[0, 1] - start == pytest.approx(expected, rel=1e-3)
     pull = '[[drive]]\nblock = "slab"\nmotion = "y"\ntimes = [0, 1]\nvalues = [0, 0.05]\n'
     points = "[monitor]\npoints = [[0.3, 0.2, 0.06]]\n"
-    sim = driven(pull, 0.5, more=points)
-    run_to(sim, 0.5)
+    sim = driven(pull, 0.25, more=points)
+    run_to(sim, 0.25)
     slid = sim.blocks.motion[1, 1] - 0.2
-    assert slid == pytest.approx(0.05 * (0.5 - 0.05), rel=1e-3)  # half of the ramp of 0.1 s later
+    assert slid == pytest.approx(0.05 * (0.25 - 0.05), rel=1e-3)  # half of the ramp of 0.1 s later
     work = sim.energy_balance.value["external_work"]
-    assert work == pytest.approx(FRICTION * mass * GRAVITY * slid, rel=1e-2)
+    kinetic = 0.5 * mass * 0.05**2
+    assert work == pytest.approx(FRICTION * mass * GRAVITY * slid + kinetic, rel=2e-3)
     reading = read_monitors(sim)
     assert reading["point 1: y_m"] == pytest.approx(0.2 + slid)
     assert reading["point 1: vy_m/s"] == pytest.approx(0.05, rel=1e-6)
@@ -397,7 +399,7 @@ def test_a_spinning_top_precesses():
     blocks = sim.blocks
     own_axis = int(np.abs(blocks.axes[1].T @ axis).argmax())
     sign = np.sign(blocks.axes[1][:, own_axis] @ axis)
-    while sim.time < 1.0:
+    while sim.time < 0.6:
         pointing = sign * blocks.axes[1][:, own_axis]
         in_space = moment * np.cross(pointing, [0.0, 0.0, -1.0])
         blocks.loads[1, 3:] = blocks.axes[1].T @ in_space
@@ -407,7 +409,7 @@ def test_a_spinning_top_precesses():
     assert np.arccos(pointing[2]) == pytest.approx(tilt, abs=5e-3)
     turned = np.arctan2(pointing[1], pointing[0])
     assert turned == pytest.approx(angle, abs=1e-4)
-    assert angle > 1.0
+    assert angle > 0.6
 
 
 def test_saved_state_continues_bit_for_bit(tmp_path):

@@ -336,11 +336,11 @@ def test_work_of_water_on_a_sinking_block_equals_the_loss_of_potential():
     straight table the pressure at the centroid of the wet part times its area. The block starts
     above the table and rotates.
 
-    The pressure is updated when the block has moved by a quarter of its skin, 1 mm.
+    The pressure is updated when the block has moved by a quarter of its skin, 2 mm.
     """
     text = law("j", 0.5) + "[water]\ntable = [[-9.0, -1.2], [9.0, 0.6]]\n" + FLOOR
     text += block("stone", corners=STONE, velocity=[1.0, 2.0], spin=-1.5)
-    sim = Simulation(parse(text + "[run]\nend = 1.0\nsettle = false\nstep = 1e-4\nskin = 4e-3\n"))
+    sim = Simulation(parse(text + "[run]\nend = 1.0\nsettle = false\nstep = 2e-4\nskin = 8e-3\n"))
     below = Polygon([(-9, -9), (9, -9), (9, 0.6), (-9, -1.2)])
 
     def potential():

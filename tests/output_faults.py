@@ -14,9 +14,11 @@ A fault is a file, the first and the last byte of the text that it replaces, and
 """
 
 import ast
+import importlib
 import itertools
 import re
 from collections import defaultdict
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,6 +72,7 @@ class Source:
 
     def __init__(self, file):
         self.file = file
+        self.module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
         self.text = (ROOT / file).read_bytes()
         self.tree = ast.parse(self.text)
         lines = self.text.splitlines(keepends=True)
@@ -245,7 +248,7 @@ def key_faults():
             yield source.insertion("keys", after, DROP % (path,), what)
     source = Source("jointlaw/parameters/toml.py")
     after = "values = validate_table(table, keys_of(kind), where, path)"
-    for kind in law_classes():
+    for kind in classes_built_from_tables():
         for name in parameters_of(kind):
             line = (
                 f"\n    if kind.__name__ == {kind.__name__!r}:\n        values.pop({name!r}, None)"
@@ -287,12 +290,57 @@ def optional_paths(rules, refused, above=()):
             yield path
 
 
-def law_classes():
-    """All classes of a law that declare parameters, those inside them too."""
-    import jointlaw as jl
+def classes_built_from_tables():
+    """All classes that declare parameters, but those that read their own table."""
+    for source in sources():
+        for node in source.tree.body:
+            decorators = [ast.unparse(one) for one in getattr(node, "decorator_list", ())]
+            methods = [getattr(one, "name", "") for one in getattr(node, "body", ())]
+            if "declared" in decorators and "from_table" not in methods:
+                yield getattr(importlib.import_module(source.module), node.name)
 
-    found = [jl.JointLaw, jl.CoulombLaw, jl.Orientation, jl.Asperity, jl.Bond, jl.Resolution]
-    return [*found, jl.GammaHeights]
+
+def table_faults(source):
+    """Keys of tables that are read without rules, ignored.
+
+    Fields of classes that read their own table (`from_table`) have their default, or 1; and keys
+    that a function looks for in one of its parameters, a table, are not there.
+    """
+    for kind in (node for node in source.tree.body if isinstance(node, ast.ClassDef)):
+        for node in (inner for inner in ast.walk(kind) if isinstance(inner, ast.Return)):
+            method = next(
+                one for one in ast.walk(kind)
+                if isinstance(one, ast.FunctionDef) and node in ast.walk(one)
+            )  # fmt: skip
+            if method.name != "from_table":
+                continue
+            for item in fields(getattr(importlib.import_module(source.module), kind.name)):
+                is_factory = item.default_factory is not MISSING
+                default = item.default_factory() if is_factory else item.default
+                value = repr(1.0 if default is MISSING else default)
+                made = source.source(node.value)
+                new = f'__import__("dataclasses").replace({made}, {item.name}={value})'
+                what = f"{kind.name}.{item.name} is ignored"
+                yield source.replacement("keys", node.value, new, what)
+    for function in (one for one in ast.walk(source.tree) if isinstance(one, ast.FunctionDef)):
+        tables = {
+            one.arg for one in function.args.args
+            if one.annotation and re.match(r"Tables?$|Mapping\[str", ast.unparse(one.annotation))
+        }  # fmt: skip
+        for node in ast.walk(function):
+            match node:
+                case ast.Compare(
+                    left=ast.Constant(value=str(key)),
+                    ops=[ast.In()],
+                    comparators=[ast.Name(id=name)],
+                ) if name in tables:
+                    yield source.replacement("keys", node, "False", f"key {key} is not there")
+                case ast.Call(
+                    func=ast.Attribute(value=ast.Name(id=name), attr="get"),
+                    args=[ast.Constant(value=str(key)), *default],
+                ) if name in tables:
+                    new = source.source(default[0]) if default else "None"
+                    yield source.replacement("keys", node, f"({new})", f"key {key} is not there")
 
 
 def state_faults():
@@ -385,7 +433,7 @@ def all_faults():
     """Faults by kind."""
     faults = defaultdict(list)
     for source in sources():
-        for find in (column_faults, unit_faults, picture_faults):
+        for find in (column_faults, unit_faults, picture_faults, table_faults):
             for fault in find(source):
                 faults[fault.kind].append(fault)
     for find in (key_faults, state_faults, page_faults):

@@ -630,6 +630,7 @@ def test_curves_have_the_law_alone(monkeypatch):
     (alone,) = (line for line in upper.lines if "law alone" in line.get_label())
     np.testing.assert_allclose(1e-3 * alone.get_xdata(), record.shear_2, atol=1e-15)
     np.testing.assert_allclose(1e6 * alone.get_ydata(), record.F2)
+    np.testing.assert_allclose(1e-3 * lower.lines[1].get_xdata(), record.shear_2, atol=1e-15)
     np.testing.assert_allclose(
         1e-3 * lower.lines[1].get_ydata(), record.closure[0] - record.closure, atol=1e-15
     )

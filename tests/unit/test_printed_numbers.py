@@ -20,13 +20,14 @@ from kinds import FITTED
 from scipy.stats import norm
 
 import jointlaw as jl
+from dem_demo import cli
 from dem_demo.cli import main as run_blocks
 from dem_demo.contact.joints import tabulate_first_loading
 from dem_demo.studies import ablate, compare
 from jointlaw.accuracy import slip as slip_tests
-from jointlaw.accuracy import suite
+from jointlaw.accuracy import suite, tradeoff
 from jointlaw.calibration import datasets, field, noise
-from jointlaw.calibration.aperture import FlowConditions, FlowFit, FlowTest
+from jointlaw.calibration.aperture import FlowConditions, FlowFit, FlowTest, read_flow
 from jointlaw.calibration.fit import Fit
 from jointlaw.calibration.meaning import describe
 from jointlaw.calibration.measured import ShearCurve
@@ -49,6 +50,7 @@ SI = {
 UNIT = "|".join(sorted(map(re.escape, SI), key=len, reverse=True))
 NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 LAW = replace(FITTED, resolution="fast")
+UNITS_OF_PEAKS = "MPa", "mm", "MPa", "mm", "MPa"
 
 
 def quantities(text):
@@ -334,6 +336,39 @@ def test_notes_and_messages_of_shear_files():
         datasets._require_one_test(readings, [*range(2, 8)], table)
 
 
+def test_names_of_shear_tests_have_their_normal_stress(tmp_path):
+    slip = np.array([0.0, 0.2, 0.5, 1.0, 2.0, 3.0])
+    stress = np.array([0.0, 1.0, 1.6, 1.5, 1.4, 1.4])
+    for scatter, is_constant in ((0.01, True), (0.08, False)):  # within 5 % in all it is constant
+        normal = 2.5 * (1 + scatter * np.linspace(-1.0, 1.0, 6))
+        header = "us [mm],tau [MPa],sn [MPa]"
+        np.savetxt(tmp_path / "lab.csv", np.column_stack([slip, stress, normal]), delimiter=",",
+                   header=header, comments="")  # fmt: skip
+        (test,) = datasets.read_shear(tmp_path / "lab.csv")
+        assert test.name.startswith("lab.csv, ")
+        assert quantities(test.name) == [pytest.approx(2.5e6)]
+        assert (np.ptp(test.normal) == 0.0) == is_constant
+    titles = [quantity.aliases[0] for quantity in (*datasets.PEAKS, datasets.NORMAL)]
+    header = ",".join(
+        f"{title} [{unit}]" for title, unit in zip(titles, UNITS_OF_PEAKS, strict=True)
+    )
+    (tmp_path / "peaks.csv").write_text(f"{header}\n1.25,0.05,0.8,9.9,2.5\n")
+    (test,) = datasets.read_peaks(tmp_path / "peaks.csv")
+    assert quantities(test.name) == [pytest.approx(2.5e6)]
+
+
+def test_conditions_of_a_flow_test_are_noted(tmp_path):
+    conditions = FlowConditions.linear(
+        0.2, 0.1, rate=5e-6 / 60, outlet_pressure=2e5, viscosity=1.3e-3
+    )
+    rows = "\n".join(f"{stress},{pressure}" for stress, pressure in ((1, 210), (2, 220), (3, 260)))
+    (tmp_path / "flow.csv").write_text(f"stress [MPa],p_in [kPa]\n{rows}\n")
+    (note,) = read_flow(tmp_path / "flow.csv", conditions).notes
+    assert quantities(note.partition(conditions.description)[2]) == pytest.approx(
+        [5e-6 / 60, 1.3e-3, 2e5]
+    )
+
+
 def test_summaries_of_predictions():
     held_out = SimpleNamespace(stress=np.array([3e6, 6e6]))
     text = fit_command._report_held_out(held_out, np.array([0.02, -0.05]))
@@ -388,6 +423,13 @@ def test_angles_of_the_accuracy_suite():
     assert path[:, 2].max() > 0.1
 
 
+def test_time_of_an_update_is_in_nanoseconds(monkeypatch):
+    """5 us for 10 joints."""
+    timer = SimpleNamespace(timeit=lambda count: 5e-6, repeat=lambda *_: [7e-6, 5e-6, 6e-6])
+    monkeypatch.setattr(tradeoff, "Timer", lambda update: timer)
+    assert tradeoff._time_update(LAW, 10, True, 1e-3) == pytest.approx(500.0)
+
+
 # ----------------------------------------------------------------------------------------- blocks
 
 
@@ -407,6 +449,31 @@ def test_laws_of_a_comparison_are_printed_in_degrees_and_millimetres(monkeypatch
     run_blocks(["compare", "slope"])
     line = capsys.readouterr().out.splitlines()[0]
     assert "40.0 degrees at the peak, 30.0 after 2.5 mm" in line
+
+
+@pytest.mark.parametrize(("carried", "is_warned"), [(0.5, True), (0.95, False)])
+def test_warning_of_a_bond_that_breaks_first(carried, is_warned, monkeypatch, capsys):
+    """A friction angle of 40 degrees, of which the asperities carry a fraction."""
+    carried_stress = carried * 2e6 * np.tan(np.radians(40))
+    monkeypatch.setattr(cli, "friction_angle", lambda *_: 40.0)
+    monkeypatch.setattr(
+        cli, "direct_shear", lambda *_, **__: SimpleNamespace(shear_stress=[0.0, carried_stress])
+    )
+    law = replace(LAW, bond=jl.Bond(1e9, 1e9, 1e6, 1e6))
+    cli._warn_of_bond("rock", law, 2e6)
+    assert ("50% of the friction at 2e+06 Pa" in capsys.readouterr().out) == is_warned
+
+
+def test_warning_of_a_closure_range_for_far_larger_stresses(capsys):
+    """From a tenth of the stress of the cells down."""
+    cell_stress = float(LAW.normal_stress(LAW.closure_range * LAW.resolution.lowest))
+    cli._warn_of_closure_range("rock", LAW, 0.12 * cell_stress)
+    assert capsys.readouterr().out == ""
+    cli._warn_of_closure_range("rock", LAW, 0.08 * cell_stress)
+    message = capsys.readouterr().out
+    assert f"carry {0.08 * cell_stress:.2g} Pa" in message
+    assert f"for {cell_stress:.2g} Pa" in message
+    assert f"closure_range = {LAW.closure(0.16 * cell_stress):.2g}" in message
 
 
 def test_row_of_a_comparison(monkeypatch):

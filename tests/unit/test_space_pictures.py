@@ -131,8 +131,8 @@ def test_a_slope_is_seen_from_its_free_side():
     statics = Statics(load("wedge"))
     eye = Drawing(statics, np.zeros(len(statics.is_free), bool)).view_direction
     assert np.linalg.norm(eye) == pytest.approx(1.0)
-    assert eye[1] < -0.7
-    assert 0.3 < eye[2] < 0.7
+    assert np.degrees(np.arcsin(eye[2])) == pytest.approx(28.0)
+    assert np.degrees(np.arctan2(eye[0], -eye[1])) == pytest.approx(-25.0, abs=1.0)
 
 
 def test_a_failed_block_does_not_set_the_colours():

@@ -1,8 +1,13 @@
-"""Every table of units against the constants of scipy, from which each unit is composed anew."""
+"""Every table of units against the constants of scipy, from which each unit is composed anew.
 
+Factors in texts with values (f-strings) are compared with the unit that follows in the text.
+"""
+
+import ast
 import re
 
 import pytest
+from output_faults import ROOT
 from scipy import constants
 
 from dem_demo.scene import drives
@@ -31,6 +36,49 @@ NAMES = {  # value in SI units
     "tf": constants.kilo * constants.kgf, "t": constants.kilo * constants.kgf,
     "at": constants.kgf / constants.centi**2,  # technical atmosphere
 }  # fmt: skip
+
+
+# A factor of a value in a text, as a power of ten; the unit may follow after other values
+POWER_OF_TEN = re.compile(rb"\{[^{}\n]*\b1e-?[369]\b[^{}\n]*\}")
+UNIT_BELOW = re.compile(
+    r"\0(?:[\s\0,.()/+-]|and|to|or|after|at|is|it)*"
+    r"((?:n|u|m|c|k|M|G)?(?:Pa s|Pa/m|Pa|N|J/m2|J|m))(?![\w/])"
+)
+
+
+def factors_in_texts():
+    """Place, factor and unit of each value that a text of the packages multiplies by a power of
+    ten, if the text names its unit."""
+    for package in ("jointlaw", "dem_demo"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            text = path.read_bytes()
+            if not POWER_OF_TEN.search(text):
+                continue
+            for node in ast.walk(ast.parse(text)):
+                if isinstance(node, ast.JoinedStr):
+                    name = f"{path.relative_to(ROOT)}:{node.lineno}"
+                    yield from ((name, *one) for one in factors_with_units(node))
+
+
+def factors_with_units(text):
+    """Factor and unit of each value of a text."""
+    plain = ["\0" if isinstance(one, ast.FormattedValue) else one.value for one in text.values]
+    for i, one in enumerate(text.values):
+        value = getattr(one, "value", None)
+        if not isinstance(one, ast.FormattedValue) or not isinstance(value, ast.BinOp):
+            continue
+        below = UNIT_BELOW.match("".join(plain[i:]))
+        sides = [side.value for side in (value.left, value.right) if isinstance(side, ast.Constant)]
+        if below and sides:
+            (number,) = sides
+            yield (1 / number if isinstance(value.op, ast.Div) else number), below[1]
+
+
+def test_factors_of_values_in_texts_are_of_their_unit():
+    found = [*factors_in_texts()]
+    assert len(found) > 30
+    for place, factor, unit in found:
+        assert factor * value_of(unit.replace(" ", "")) == pytest.approx(1.0, rel=1e-12), place
 
 
 def value_of(unit):

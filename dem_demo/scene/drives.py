@@ -73,6 +73,11 @@ class Drive:
         mean_velocity = make_interp_spline(corners, (present - delayed) / self.ramp, k=1)
         return mean_velocity.antiderivative()
 
+    @cached_property
+    def span(self) -> tuple[float, float]:
+        """First and last time (s) of the path."""
+        return float(self.path.t[0]), float(self.path.t[-1])
+
     def __call__(self, t: float, reversed_at: float = np.inf) -> float:
         """Return the prescribed displacement (m or rad) at time t (s).
 
@@ -81,7 +86,8 @@ class Drive:
         if np.isfinite(reversed_at):
             return _reversed_drive(self, reversed_at)(t)
         path = self.path
-        inside = min(max(t, path.t[0]), path.t[-1])
+        first, last = self.span
+        inside = min(max(t, first), last)
         coasted = (t - inside) * path(inside, nu=1) if self.order else 0.0
         return float(path(inside) + coasted)
 

@@ -76,9 +76,9 @@ class ExactJoint:
                 G0, k0 = self.cell(f, i, y0)
                 G1, k1 = self.cell(f, i, y1)
                 if k1 > k0:
-                    q[i] = q[i] + a * (G1 - G0) / (y1 - y0) * de
+                    q[i] = q[i] + de * (a * (G1 - G0) / (y1 - y0))
                 else:
-                    q[i] = q[i] * (k1 / k0 if k0 > 0 else 0) + a * k1 * de
+                    q[i] = q[i] * (k1 / k0 if k0 > 0 else 0) + de * (a * k1)
                 cap = self.mu * self.lam * self.area[f] * G1
                 size = mp.hypot(*q[i])
                 q[i] = q[i] * (cap / size if size > cap else 1)

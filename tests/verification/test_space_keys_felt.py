@@ -123,7 +123,7 @@ UNIFORM = IN_SITU | {
 STAGE = {"box": [0.9, 0.9, 1.0], "at": [0.0, 0.0, 1.5], "start": 1.0, "release_time": 0.1}
 DUG = IN_SITU | {"excavate": [STAGE]}
 PART = {key: value for key, value in STAGE.items() if key not in ("box", "at")}
-TETRAHEDRON = [[-1.0, -1.0, 0.8], [1.2, -1.0, 0.8], [0.0, 1.5, 0.8], [0.0, 0.0, 2.8]]
+DUG_PRISM = [[x, y, z] for x in (-0.45, 0.45) for y in (-0.45, 0.45) for z in (1.0, 2.0)]
 
 
 TOSSED = TWO | {"at": [0.1, 0.0, 0.701], "velocity": [0.1, 0.0, -0.2], "spin": [0.1, 0.2, 0.3]}
@@ -259,9 +259,9 @@ PROBES = {  # path of the key: scene, where the key is in it, another value
     "excavate.box": (DUG, "excavate.0.box", [1.0, 1.0, 1.0]),
     "excavate.at": (DUG, "excavate.0.at", [0.1, 0.0, 1.5]),
     "excavate.corners": (
-        IN_SITU | {"excavate": [PART | {"corners": TETRAHEDRON}]},
-        "excavate.0.corners.3",
-        [0.0, 0.0, 3.2],
+        IN_SITU | {"excavate": [PART | {"corners": DUG_PRISM}]},
+        "excavate.0.corners",
+        [[x, y, 1.1 * z] for x, y, z in DUG_PRISM],
     ),
     "excavate.start": (DUG, "excavate.0.start", 2.0),
     "excavate.release_time": (DUG, "excavate.0.release_time", 0.2),

@@ -231,8 +231,9 @@ def test_faces_of_other_joints_are_refused():
 
 def test_picture_of_a_scan(surface, tmp_path):
     fit = jl.from_surface(surface, SPACING)
+    path = tmp_path / "scan.png"
     hillshade, inclinations, depths, _ = sorted(
-        fit.plot().axes, key=lambda axis: axis.get_position().x0 + 2 * (axis.get_label() != "")
+        fit.plot(path).axes, key=lambda axis: axis.get_position().x0 + 2 * (axis.get_label() != "")
     )
     summits = next(line for line in hillshade.lines if "summits" in line.get_label())
     rows, columns = fit.asperities.grid_indices.T
@@ -253,8 +254,6 @@ def test_picture_of_a_scan(surface, tmp_path):
     (density,) = depths.lines
     x, y = density.get_xydata().T
     assert 0.9 < trapezoid(y, x) <= 1.0
-    path = tmp_path / "scan.png"
-    fit.plot(path)
     assert path.read_bytes().startswith(b"\x89PNG")
 
 

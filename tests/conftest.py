@@ -44,6 +44,14 @@ def moved(law):
 
 
 @pytest.fixture
+def assumed_drawing_time(monkeypatch):
+    """Estimates of the time of a run assume 1 s for pictures; no picture is drawn to measure it."""
+    from dem_demo.output.pictures import Pictures
+
+    monkeypatch.setattr(Pictures, "estimate_time", lambda self, frames: 1.0)
+
+
+@pytest.fixture
 def in_an_empty_folder(tmp_path, monkeypatch):
     """As a reader runs a command: in an empty folder, without a display."""
     monkeypatch.chdir(tmp_path)

@@ -163,6 +163,7 @@ def lines_of(capsys, *words):
     return capsys.readouterr().out.splitlines()
 
 
+@pytest.mark.usefixtures("assumed_drawing_time")
 def test_check_and_summary_say_whether_the_scene_starts_in_equilibrium(
     tmp_path, capsys, monkeypatch
 ):

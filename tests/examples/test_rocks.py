@@ -24,6 +24,7 @@ from dem_demo.studies.ablate import _run, ablate, variants
 from dem_demo.studies.compare import compare, coulomb_of_same_strength
 from dem_demo.studies.strength import alone, critical_tilt
 
+pytestmark = pytest.mark.usefixtures("assumed_drawing_time")
 TEXT = TEMPLATE.read_text()
 PLAIN = f"\n[laws.plain]\n{coulomb(0.4, 4e8, 3e8)}"
 
@@ -124,6 +125,7 @@ def test_a_scene_made_from_the_template(tmp_path, capsys):
         ("seed = 1", "seed = 4"),
         ("persistence = 0.7", "persistence = 0.5"),
         ("end = 1.0", "end = 0.1"),
+        ("record = 0.02 ", "record = 0.05 "),
         ("[monitor]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n" + PLAIN + "\n[monitor]"),
     ):
         assert old in text

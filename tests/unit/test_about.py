@@ -84,6 +84,7 @@ def test_every_command_repeats_the_warnings(command, law_file, tmp_path, capsys)
         assert f"- {CAVEAT}" in out
 
 
+@pytest.mark.usefixtures("assumed_drawing_time")
 def test_scenes_repeat_the_warnings_of_their_laws(law_file, tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(
@@ -93,11 +94,15 @@ def test_scenes_repeat_the_warnings_of_their_laws(law_file, tmp_path, capsys):
         + block("top", box=[1.0, 1.0], at=[0.0, 0.5])
         + "[run]\nend = 0.001\n"
     )
-    for command in (["check", str(scene)], ["run", str(scene), "--out", str(tmp_path / "out")]):
+    without = ["--no-pictures"]
+    for command in (
+        ["check", str(scene)],
+        ["run", str(scene), *without, "--out", str(tmp_path / "out")],
+    ):
         assert dem_main(command) == 0
         assert f"warning, {law_file.name}: {CAVEAT}" in capsys.readouterr().err
     state = tmp_path / "out"
-    resume = ["resume", str(state), "--out", str(tmp_path / "more"), "--until", "0.002"]
+    resume = ["resume", str(state), "--out", str(tmp_path / "more"), *without, "--until", "0.002"]
     assert dem_main(resume) == 0
     assert CAVEAT in capsys.readouterr().err
 

@@ -13,6 +13,8 @@ from dem_demo.output.pictures import Pictures
 from dem_demo.output.record import RunRecord
 from dem_demo.output.run import advance
 
+pytestmark = pytest.mark.usefixtures("assumed_drawing_time")
+
 
 def check(text, tmp_path, capsys):
     path = tmp_path / "scene.toml"

@@ -27,13 +27,18 @@ FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "next_contacts": ([POINTER] * 2, None),
     "update_contacts": ([INTEGER] * 2, INTEGER),
     "find_candidates": ([INTEGER, *[POINTER] * 4, INTEGER, *[POINTER] * 4], INTEGER),
+    "edge_pairs": ([POINTER], None),
+    "laws_of": ([POINTER, INTEGER, POINTER, POINTER], None),
+    "find_neighbours": ([], INTEGER),
     "compute_rates": ([], None),
     "set_increments": ([DOUBLE], None),
+    "set_increments_of": ([DOUBLE, INTEGER, POINTER], None),
     "check_speeds": ([DOUBLE], None),
     "move_blocks": ([DOUBLE], None),
     "run_phase": ([DOUBLE, INTEGER], None),
     "add_energies": ([DOUBLE], None),
     "read_joints": ([], None),
+    "read_joints_of": ([INTEGER, POINTER], None),
     "compute_forces": ([DOUBLE], None),
     "finish_step": ([DOUBLE], None),
     "compute_unbalanced": ([], ctypes.c_int),
@@ -143,6 +148,18 @@ class CornerArrays(Arrays):
     """`dem_corners` of layout.h: outlines of the blocks, and contacts of corners on edges."""
 
     _fields_ = [(name, field.ctype) for name, field in layout.CORNERS.items()]
+
+
+class EdgeLawArrays(Arrays):
+    """`dem_edge_laws` of layout.h: laws of edges and blocks."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.EDGE_LAWS.items()]
+
+
+class SeamArrays(Arrays):
+    """`dem_seams` of layout.h: contacts and joints at seams between coplanar edges."""
+
+    _fields_ = [(name, field.ctype) for name, field in layout.SEAMS.items()]
 
 
 class RelaxationArrays(Arrays):

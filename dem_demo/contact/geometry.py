@@ -30,11 +30,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..compiled import CornerArrays, address
-from ..native.layout import CONSTANTS
 from ..scene import Block
 from .rows import ContactRows
-
-PARALLEL_SINE = CONSTANTS["PARALLEL_SINE"].value
 
 
 class Outlines:
@@ -154,9 +151,9 @@ class Contacts(ContactRows):
 
         Of the two sides of the corner, the one with the smaller tilt.
         """
-        first_is_flatter = self.tilt_sine[0] < self.tilt_sine[1] - PARALLEL_SINE
-        side = np.where(first_is_flatter, self.outlines.previous[self.corner], self.corner)
-        return np.column_stack([np.minimum(side, self.edge), np.maximum(side, self.edge)])
+        pairs = np.empty((len(self.corner), 2), np.int64)
+        self.corner_arrays.call("edge_pairs", address(pairs))
+        return pairs
 
     def next_codes(self) -> np.ndarray:
         """Codes (k,) of the contacts that come next at the nearer limits of the ranges."""

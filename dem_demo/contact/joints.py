@@ -118,19 +118,23 @@ class LawJoints:
         start = np.zeros(self.dim) if mated else self.law.unmated_start
         batch = self.pool.batch
         batch.reset(places, mated)
-        if not bonded:
+        if bonded:
+            damage = batch.damage[places]
+        else:
             batch.break_bond(places)
-        measures = np.zeros((len(places), len(MEASURES)))
+            damage = min([1.0, *self.law.tables.damage_rows.values()])
+        measures = np.zeros((len(places), self.step.measures.shape[1]))
         measures[:, MEASURES.index("separated")] = 1.0
-        measures[:, MEASURES.index("damage")] = batch.damage[places]
+        measures[:, MEASURES.index("damage")] = damage
+        measures[:, len(MEASURES) :] = start
         self.step.F[places] = 0.0
-        self.step.measures[places] = np.column_stack([measures, np.tile(start, (len(places), 1))])
+        self.step.measures[places] = measures
         return start
 
     def copy(self, source: np.ndarray, target: np.ndarray) -> None:
         """Make the joints at places `target` (m,) copies of the joints at `source` (m,)."""
         batch = self.pool.batch
-        batch.restore(batch.snapshot(source), target)
+        batch.copy(source, target)
         self.step.F[target] = self.step.F[source]
         self.step.measures[target] = self.step.measures[source]
 
@@ -393,7 +397,7 @@ class Joints:
                     closure = np.minimum(closure, max_closure[mine])
                     out[:, mine] = closure, np.interp(closure, curve["closure"], curve["work"])
                     joints.initialise(self.place[rows[mine]], mated, bonded=False)
-        self.step_arrays.call("read_joints")
+        self.step_arrays.call("read_joints_of", len(rows), address(rows))
         return out
 
     def continue_joints(self, rows: np.ndarray, sources: np.ndarray) -> bool:
@@ -404,24 +408,26 @@ class Joints:
         Returns whether arrays were made anew, which must be bound again: where a law changes.
         """
         law = self.law[sources]
-        changed = np.flatnonzero(self.law[rows] != law)
-        for row, new_law in zip(rows[changed].tolist(), law[changed].tolist(), strict=True):
+        changed = np.flatnonzero(self.law[rows] != law).tolist()
+        for i in changed:
+            row = int(rows[i])
+            new_law = int(law[i])
             self.by_law[self.law[row]].release(self.place[[row]])
             self.law[row] = new_law
             self.place[row] = self.by_law[new_law].allocate(1)[0]
-        for i, joints in enumerate(self.by_law):
-            remaining = np.flatnonzero(law == i)
-            while len(remaining):  # a snapshot holds each source once
-                _, first = np.unique(sources[remaining], return_index=True)
-                copied = remaining[first]
-                joints.copy(self.place[sources[copied]], self.place[rows[copied]])
-                remaining = np.delete(remaining, first)
+        new_places = self.place[rows]
+        old_places = self.place[sources]
+        for i in set(law.tolist()):
+            has_law = law == i
+            self.by_law[i].copy(old_places[has_law], new_places[has_law])
         self.first_touch[rows] = self.first_touch[sources]
-        if len(changed):
+        if changed:
             self._arrange(self.law, self.place)
         else:
-            self.step_arrays.call("read_joints")
-        return len(changed) > 0
+            self.traction[rows] = self.traction[sources]
+            self.delta[rows] = self.delta[sources]
+            self.measures[:, rows] = self.measures[:, sources]
+        return bool(changed)
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """A copy of all state, by names of arrays. Laws are numbered in them."""

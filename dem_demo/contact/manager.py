@@ -32,12 +32,13 @@ faces would drop there by their whole dilation, although the surface does not en
 contact continues the joint of its neighbour instead (`find_neighbours`).
 """
 
+import ctypes
+
 import numpy as np
 
-from ..compiled import address
+from ..compiled import EdgeLawArrays, SeamArrays, address
 from ..native.layout import CONSTANTS
 from ..scene import Scene, SceneError
-from .candidates import find_equal, find_nearest
 from .geometry import Contacts, Outlines
 
 RANGE_TOLERANCE = CONSTANTS["RANGE_TOLERANCE"].value
@@ -48,8 +49,7 @@ MAX_SKIN_UNTIL_REBUILD = 0.25  # fraction of its skin that a block may move unti
 MOVED_FRACTION = 0.001  # of its skin: blocks that moved less are left out of a rebuild
 DROP_GAP = 1.5  # skins: gap beyond which a contact is dropped
 CAPACITY = 64  # candidates that there is room for at first
-MAX_SEAM_SINE = np.sin(np.radians(2.0))  # of the angle between coplanar edges, as in the C file
-MAX_SEAM_STEP = 0.05  # of the skin: step between coplanar edges at a seam
+ANY = -1  # block in a table of laws
 
 
 def _in_range(contacts: Contacts, is_known: np.ndarray) -> np.ndarray:
@@ -106,17 +106,22 @@ class ContactManager:
     def _read_laws(self, scene: Scene) -> None:
         """Numbers of the laws: default, of edges, and of [[joint]] tables in rising priority."""
         number = {name: i for i, name in enumerate(scene.laws)}
-        self._default_law = number[scene.default_law]
-        self._law_of_edge = np.full(self.outlines.first_corner[-1], -1)
+        law_of_edge = np.full(self.outlines.first_corner[-1], -1)
         for (block, edge), law in scene.edge_laws.items():
-            self._law_of_edge[self.outlines.first_corner[block] + edge] = number[law]
-        second_block, first_block, both_blocks = [1], [0], [0, 1]
-        self._laws_of_blocks = [
-            (sides, sorted(named), number[law])
-            for sides in (second_block, first_block, both_blocks)
-            for named, law in scene.pairs.items()
-            if len(named) == len(sides)
-        ]
+            law_of_edge[self.outlines.first_corner[block] + edge] = number[law]
+        tables = []
+        for named, law in scene.pairs.items():
+            if len(named) == 1:
+                (block,) = named
+                tables += [(0, ANY, block, number[law]), (1, block, ANY, number[law])]
+            else:
+                tables.append((2, *sorted(named), number[law]))
+        in_rising_priority = [table[1:] for table in sorted(tables, key=lambda table: table[0])]
+        self._laws = EdgeLawArrays(default_law=number[scene.default_law], n_tables=len(tables))
+        self._laws.bind(
+            law_of_edge=law_of_edge,
+            tables=np.array(in_rising_priority, np.int64).reshape(-1, 3),
+        )
 
     @property
     def closure(self) -> np.ndarray:
@@ -184,53 +189,37 @@ class ContactManager:
         self.needs_rebuild[:] = False
         return has_moved
 
-    def find_neighbours(self, rows: np.ndarray, bears_load: np.ndarray) -> np.ndarray:
-        """Contacts (m,) whose joints the contacts `rows` (m,) continue across a seam; -1 for none.
+    def bind_joints(self, stored_energy: np.ndarray, traction: np.ndarray) -> None:
+        """Bind stored energies (k,) in J/m2 and tractions (k, 2) in Pa of the joints to the search
+        across seams, after each change of the list of contacts."""
+        k = len(self.law)
+        self._seams = SeamArrays()
+        self._seams.bind(
+            self, "skins", "law", "face_pairs", corners=self.contacts.corner_arrays,
+            laws=self._laws, stored_energy=stored_energy, traction=traction,
+            is_new=np.zeros(k, bool), rows=np.empty(k, np.int64), edges=np.empty((k, 2), np.int64),
+            sources=np.empty(k, np.int64), first_side=np.full(len(self.outlines.block), -1),
+            next_side=np.empty(2 * k, np.int64), distance=np.empty(k),
+        )  # fmt: skip
 
-        A contact and its neighbour share one edge. Their other edges belong to two blocks and are
-        coplanar. The neighbour bears a load, as the mask `bears_load` (k,) tells, is as deep as the
-        contact within `MAX_SEAM_STEP`, and has the law that the edges of the contact need. Of
-        several neighbours the nearest one is taken.
+    def find_neighbours(self, is_new: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Contacts (m,) whose joints continue the joints of neighbours across a seam, and these
+        neighbours (m,).
+
+        is_new (k,): mask of new contacts; none by default. Such a contact bears nothing, and is new
+        or meets between other edges than `face_pairs`, which it then gets. It shares an edge with
+        its neighbour. Their other edges belong to two blocks and are coplanar: parallel within 2
+        degrees; at the seam they end within a skin of each other, and within `MAX_SEAM_STEP` of a
+        skin across their direction. The neighbour stores energy, is as deep as the contact within
+        `MAX_SEAM_STEP` of a skin, and has the law that the edges of the contact need. Of several
+        neighbours the nearest one is taken.
         """
-        contacts = self.contacts
-        edge_pairs = contacts.edge_pairs
-        edges = edge_pairs[rows].ravel()
-        is_edge_of_row = np.zeros(len(self.outlines.block), bool)
-        is_edge_of_row[edges] = True
-        first_edge, second_edge = edge_pairs.T
-        shares_edge = is_edge_of_row[first_edge] | is_edge_of_row[second_edge]
-        loaded = np.flatnonzero(bears_load & shares_edge)
-        shared, shared_by_candidate = find_equal(edges, edge_pairs[loaded].ravel())
-        number = shared // 2  # of two edges each
-        row = rows[number]
-        candidate = loaded[shared_by_candidate // 2]
-        across_seam = edge_pairs[candidate, 1 - shared_by_candidate % 2]
-        edge_of_row = edge_pairs[row, 1 - shared % 2]
-        max_step = MAX_SEAM_STEP * self._skin(contacts.block_a[row], contacts.block_b[row])
-        is_as_deep = np.abs(contacts.closure[candidate] - contacts.closure[row]) <= max_step
-        has_law = self.law[candidate] == self.laws_of(edge_pairs[rows])[number]
-        is_neighbour = is_as_deep & has_law & self._are_coplanar(across_seam, edge_of_row)
-        distance = np.abs(contacts.position[candidate] - contacts.position[row])
-        distance[~is_neighbour] = np.inf
-        return find_nearest(len(rows), number, candidate, distance)
-
-    def _are_coplanar(self, edges: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Whether edges (m,) of other blocks continue the edges `others` (m,) across seams.
-
-        They are parallel within 2 degrees. At the seam they end within a skin of each other, and
-        within `MAX_SEAM_STEP` of a skin across their direction.
-        """
-        outlines = self.outlines
-        start = outlines.corner_position
-        reverse = outlines.edge_direction[others].conj()
-        skin = self.skins[outlines.block[others]]
-        angle = outlines.edge_direction[edges] * reverse
-        to_next = (start[edges] - start[outlines.next[others]]) * reverse
-        to_previous = (start[outlines.next[edges]] - start[others]) * reverse
-        seam = np.where(np.abs(to_next) < np.abs(to_previous), to_next, to_previous)
-        is_parallel = (angle.real > 0) & (np.abs(angle.imag) <= MAX_SEAM_SINE)
-        is_near = (np.abs(seam) <= skin) & (np.abs(seam.imag) <= MAX_SEAM_STEP * skin)
-        return is_parallel & is_near & (outlines.block[edges] != outlines.block[others])
+        arrays = self._seams.bound_arrays
+        arrays["is_new"][:] = False if is_new is None else is_new
+        n = self._seams.call("find_neighbours")
+        rows = arrays["rows"][:n].copy()
+        self.face_pairs[rows] = arrays["edges"][:n]
+        return rows, arrays["sources"][:n].copy()
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""
@@ -248,12 +237,11 @@ class ContactManager:
         them, the block that comes first in the scene if both have one; the law of the joint set
         that cut both edges; the default of the scene.
         """
-        first_law, second_law = self._law_of_edge[edge_pairs].T
-        is_joint = (first_law == second_law) & (first_law >= 0)
-        law = np.where(is_joint, first_law, self._default_law)
-        blocks = self.outlines.block[edge_pairs]
-        for sides, named, law_number in self._laws_of_blocks:
-            law[(blocks[:, sides] == named).all(axis=1)] = law_number
+        pairs = np.ascontiguousarray(edge_pairs, np.int64)
+        law = np.empty(len(pairs), np.int64)
+        arrays = self.contacts.corner_arrays
+        laws = ctypes.addressof(self._laws)
+        arrays.call("laws_of", laws, len(pairs), address(pairs), address(law))
         return law
 
     def _find(

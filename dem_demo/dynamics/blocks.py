@@ -184,9 +184,10 @@ def apply_loads(
         loads += scene.thickness * _pressure_on_faces(
             face_pressure, contacts.outlines, blocks.motion
         )
-    pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[manager.law]
-    push = pressure * contacts.overlap_length.sum(axis=0) * scene.thickness
-    loads += contacts.assemble_forces(len(loads), np.stack([push, 0.0 * push], axis=1))
+    if any(scene.pressure.values()):
+        pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[manager.law]
+        push = pressure * contacts.overlap_length.sum(axis=0) * scene.thickness
+        loads += contacts.assemble_forces(len(loads), np.stack([push, 0.0 * push], axis=1))
     blocks.loads[:] = loads * blocks.is_mobile
     return blocks.loads - old_loads
 
@@ -252,16 +253,17 @@ def _pressure_on_faces(
 
 
 def _stress_on_edges(stress: Stress, outlines: Outlines, motion: np.ndarray) -> np.ndarray:
-    """Forces and torques (n, 3) of a stress on edges of the blocks, per m of thickness.
+    """Forces and torques (n, 3) of a stress on the edges that it loads, per m of thickness.
 
     An edge is split where the line of the stress bends and where the edge crosses it. Along each
     part from a to b, of length L, the stress varies linearly from u_a to u_b. Its force is
     -S.n L (u_a + u_b)/2 and acts at a + (b - a)(u_a + 2 u_b)/(3 (u_a + u_b)).
     """
-    start = outlines.corner_position
-    block = outlines.block
+    edges = np.flatnonzero(stress.edges)
+    start = outlines.corner_position[edges]
+    block = outlines.block[edges]
     centroid = (motion[0] + 1j * motion[1])[block, None]
-    along = (start[outlines.next] - start)[:, None]
+    along = (outlines.corner_position[outlines.next[edges]] - start)[:, None]
     run = np.where(along.real, along.real, np.inf)
     bends = np.sort(np.clip((stress.line[:, 0] - start.real[:, None]) / run, 0.0, 1.0))
     zero = 0.0 * along.real
@@ -278,7 +280,7 @@ def _stress_on_edges(stress: Stress, outlines: Outlines, motion: np.ndarray) -> 
     u_a = np.maximum(depth_a, 0.0)
     u_b = np.maximum(depth_b, 0.0)
     inward = 1j * (b - a)  # minus the outward normal, times the length
-    push = stress.on(inward) * stress.edges[:, None]
+    push = stress.on(inward)
     force = push * (u_a + u_b) / 2
     arms = ((a - centroid) * (2 * u_a + u_b) + (b - centroid) * (u_a + 2 * u_b)) / 6
     torque = (arms.conj() * push).imag

@@ -26,7 +26,7 @@ import numpy as np
 
 from jointlaw.support.files import write_files
 
-from ..compiled import StepArrays, function_address
+from ..compiled import StepArrays, address, function_address
 from ..contact import STATE_PARTS, ContactManager, Contacts, Joints
 from ..scene import Files, Scene, SceneError, parse
 from .blocks import MAX_SKIN_PER_STEP, Blocks, apply_loads
@@ -39,6 +39,7 @@ from .timestep import MAX_FRACTION_OF_LIMIT, TimeStepLimit, impact_limit
 WIDE_MARGIN = 0.4  # fraction of the limit: a step below it stays stable as lever arms change
 LENGTH_TOLERANCE = 1e-6  # relative: lengths that differ by rounding only
 TINY = 1e-300  # lower bound of a denominator
+NO_ROWS = np.zeros(0, np.int64)
 CHECK_INTERVAL = 16  # steps between two checks of drives and of excavation stages
 TIME_ROUNDING = 1e-12  # relative: times that differ by rounding only
 MIN_STEP_SHARE = 1e-4  # of the time step: shorter parts of a divided step lose digits of drives
@@ -524,19 +525,27 @@ class Simulation:
         corner_arrays = self.contacts.corner_arrays
         corner_arrays.bind(motion=self.blocks.motion, needs_rebuild=self.manager.needs_rebuild)
         arrays.bind(geometry=corner_arrays)
+        self.manager.bind_joints(self.joints.stored_energy, self.joints.traction)
         arrays.update_geometry = function_address("update_contacts")
 
     # ------------------------------------------------------------------ contacts that change
 
     def _update_contact_list(self) -> None:
         """Bring joints, energies and limit up to date with transferred and new contacts."""
-        is_new = np.zeros(self.joints.n, bool)
-        if self.arrays.transferred:
-            self._transfer_joints()
-        if self.arrays.rebuild:
+        arrays = self.arrays
+        is_new = None
+        restarted = NO_ROWS
+        if arrays.transferred:
+            restarted = self._transfer_joints()
+        if arrays.rebuild:
             is_new = self._rebuild_contacts()
-        self._continue_across_seams(is_new)
-        self.arrays.call("set_increments", self.dt)
+        continued = self._continue_across_seams(is_new)
+        if self.arrays is not arrays:
+            self.arrays.call("set_increments", self.dt)
+            return
+        changed = np.concatenate([restarted, continued])
+        if len(changed):
+            self.arrays.call("set_increments_of", self.dt, len(changed), address(changed))
 
     def _rebuild_contacts(self) -> np.ndarray:
         """Rebuild the list of contacts; drop the energy of the joints that end.
@@ -563,29 +572,20 @@ class Simulation:
         balance.change_loads(blocks, self._apply_loads(), self.dt)
         return old_row < 0
 
-    def _continue_across_seams(self, is_new: np.ndarray) -> None:
+    def _continue_across_seams(self, is_new: np.ndarray | None) -> np.ndarray:
         """Let contacts that have reached a coplanar block continue the joints of their neighbours.
 
         These contacts bear nothing yet. They are new (is_new (k,)), or have gone on to other edges
-        than the ones between which the manager found them.
+        than the ones between which the manager found them. Returns these contacts (m,).
         """
         manager = self.manager
         joints = self.joints
-        edge_pairs = self.contacts.edge_pairs
-        first_is_other, second_is_other = (edge_pairs != manager.face_pairs).T
-        has_other_edges = first_is_other | second_is_other
-        stored_energy = joints.stored_energy
-        rows = np.flatnonzero((stored_energy == 0) & (is_new | has_other_edges))
-        rows = rows[(joints.traction[rows] == 0).all(axis=1)]
+        rows, sources = manager.find_neighbours(is_new)
         if not len(rows):
-            return
-        sources = manager.find_neighbours(rows, stored_energy > 0)
-        rows, sources = rows[sources >= 0], sources[sources >= 0]
-        if not len(rows):
-            return
-        manager.face_pairs[rows] = edge_pairs[rows]
-        has_other_laws = (manager.law[rows] != manager.law[sources]).any()
-        manager.law[rows] = manager.law[sources]
+            return rows
+        law = manager.law[sources]
+        has_other_laws = (manager.law[rows] != law).any()
+        manager.law[rows] = law
         manager.closure_offset[rows] = manager.closure_offset[sources]
         has_new_arrays = joints.continue_joints(rows, sources)
         balance = self.energy_balance
@@ -594,8 +594,9 @@ class Simulation:
             self.bind()
         if has_other_laws:  # laws have water pressures
             balance.change_loads(self.blocks, self._apply_loads(), self.dt)
+        return rows
 
-    def _transfer_joints(self) -> None:
+    def _transfer_joints(self) -> np.ndarray:
         """Update joints and energies of contacts whose corners went on to other edges.
 
         The length of joint is the same before and after where an edge that lies on another, or a
@@ -603,6 +604,8 @@ class Simulation:
         become shorter drops the energy stored on the rest. One that has become longer would create
         energy: it starts as new instead, at the closure at which it stores the energy of the
         shorter one, and the remaining depth becomes its closure offset.
+
+        Returns the contacts (m,) whose joints start as new.
         """
         balance = self.energy_balance
         manager = self.manager
@@ -610,23 +613,28 @@ class Simulation:
         thickness = self.scene.thickness
         length = self.contacts.length
         old_length = self.contacts.previous_length
-        old_energy = joints.stored_energy * old_length  # J/m
-        ratio = length / np.maximum(old_length, TINY)
+        changed = np.flatnonzero(length != old_length)
+        old_energy = joints.stored_energy[changed] * old_length[changed]  # J/m
+        ratio = length[changed] / np.maximum(old_length[changed], TINY)
         has_changed = (np.abs(ratio - 1) > LENGTH_TOLERANCE) & (old_energy > 0)
-        changed = np.flatnonzero(has_changed)
-        is_longer = ratio[changed] > 1
+        changed = changed[has_changed]
+        if not len(changed):
+            return changed
+        old_energy = old_energy[has_changed]
+        is_longer = ratio[has_changed] > 1
         new_energy = joints.stored_energy[changed]  # J/m2
         balance.booked_area[changed] = self.contacts.area[changed]
-        if is_longer.any():
-            restarted = changed[is_longer]
+        restarted = changed[is_longer]
+        if len(restarted):
             closure = manager.closure[restarted]
             new_closure, new_energy[is_longer] = joints.restart(
-                restarted, old_energy[restarted] / length[restarted], closure
+                restarted, old_energy[is_longer] / length[restarted], closure
             )
             manager.closure_offset[restarted] += closure - new_closure
             balance.booked_dissipation[restarted] = 0.0
-        discarded = old_energy[changed] - new_energy * length[changed]
+        discarded = old_energy - new_energy * length[changed]
         balance.energy[DISCARDED] += np.maximum(discarded, 0.0).sum() * thickness
+        return restarted
 
     # ------------------------------------------------------------------ means over a joint
 

@@ -116,9 +116,10 @@ def block_stiffness(
     """
     dof = kinematics.shape[2]
     stiffness = np.empty((n, dof, dof))
+    by_motion = np.ascontiguousarray(kinematics.T)  # (dof, dim, k): sums over dim are fast
     for i in range(dof):
         for j in range(i + 1):
-            products = springs * (kinematics[:, :, i] * kinematics[:, :, j]).sum(axis=1)
+            products = springs * (by_motion[i] * by_motion[j]).sum(axis=0)
             stiffness[:, i, j] = stiffness[:, j, i] = np.bincount(block, products, n)
     return stiffness
 

@@ -96,6 +96,16 @@ EXPORT void dem_set_increments(dem_step *sim, double dt)
   else set_increments(sim, dt, 0, sim->n_contacts, 3, 6);
 }
 
+/* The same for some contact points (m,) */
+EXPORT void dem_set_increments_of(dem_step *sim, double dt, long long m, const long long *points)
+{
+  for (long long j = 0; j < m; j++) {
+    const long long i = points[j];
+    if (sim->dof == 3) set_increments(sim, dt, i, i + 1, 2, 3);
+    else set_increments(sim, dt, i, i + 1, 3, 6);
+  }
+}
+
 /* Rates of all contact points */
 EXPORT void dem_compute_rates(dem_step *sim)
 {
@@ -203,6 +213,15 @@ EXPORT void dem_read_joints(dem_step *sim)
   else read_joints(sim, 0, sim->n_contacts, 3);
 }
 
+/* The same for some contact points (m,) */
+EXPORT void dem_read_joints_of(dem_step *sim, long long m, const long long *points)
+{
+  for (long long j = 0; j < m; j++) {
+    if (sim->dim == 2) read_joints(sim, points[j], points[j] + 1, 2);
+    else read_joints(sim, points[j], points[j] + 1, 3);
+  }
+}
+
 /* Upper bound of the stiffness (Pa/m) of contact i at its normal stress, by linear interpolation on
  * the first-loading curve */
 static double stiffness_bound(const dem_step *sim, long long i)
@@ -283,6 +302,17 @@ INLINE void add_point_forces(const dem_step *sim, long long i, int side, double 
   }
 }
 
+/* Whether contact point i exerts no force: a point of a joint that is open, as most are where blocks
+ * slide */
+INLINE int exerts_nothing(const dem_step *sim, long long i, const int dim)
+{
+  const double *forces = sim->point_forces + 2 * dim * i;
+  if (sim->measures[DEM_STORED_ENERGY * sim->n_contacts + i] != 0.0) return 0;
+  for (int c = 0; c < 2 * dim; c++)
+    if (forces[c] != 0.0) return 0;
+  return 1;
+}
+
 /* Forces on blocks `begin` to `end`, whose points are summed in their order */
 INLINE void find_forces_on_blocks(dem_step *sim, double dt, long long begin, long long end,
                                   const int dim, const int dof)
@@ -297,6 +327,7 @@ INLINE void find_forces_on_blocks(dem_step *sim, double dt, long long begin, lon
   const int is_all = begin == 0 && end == n;
   for (long long i = 0; i < sim->n_contacts; i++) {
     const long long a = sim->block_a[i], b = sim->block_b[i];
+    if (exerts_nothing(sim, i, dim)) continue;
     if (is_all || (a >= begin && a < end))
       add_point_forces(sim, i, 0, total + dof * a, damped + dof * a, dim, dof);
     if (is_all || (b >= begin && b < end))

@@ -54,7 +54,12 @@ static inline dem_vector centroid(const dem_corners *plane, long long block)
 /* |x| without the kink, smooth within `width` of 0; writes its derivative */
 static inline double smooth_size(double x, double width, double *slope)
 {
-  const double size = fabs(x), part = smaller(size / width, 1.0);
+  const double size = fabs(x);
+  if (size >= width) { /* most ends are farther away: no division */
+    *slope = sign_of(x);
+    return size;
+  }
+  const double part = size / width;
   *slope = sign_of(x) * part * (4.0 - 3.0 * part);
   return size * part * (2.0 - part);
 }
@@ -65,7 +70,11 @@ static double standing_length(const dem_corners *plane, double x, double edge_le
 {
   const double width = smaller(plane->transition_length, 0.5 * edge_length);
   const double to_end = edge_length - x;
-  const double part = larger(smaller(smaller(x, to_end) / width, 1.0), 0.0);
+  const double to_nearer_end = smaller(x, to_end);
+  *slope = 0.0;
+  if (to_nearer_end >= width) return plane->corner_length;
+  if (to_nearer_end <= 0.0) return 0.0;
+  const double part = to_nearer_end / width;
   *slope = plane->corner_length * 6.0 * part * (1.0 - part) / (x < to_end ? width : -width);
   return plane->corner_length * part * part * (3.0 - 2.0 * part);
 }
@@ -74,8 +83,11 @@ static double standing_length(const dem_corners *plane, double x, double edge_le
  * (1/rad) */
 static inline double raised_fraction(double sine, double cosine, double *slope)
 {
-  double part = (fabs(sine) - FACE_SINE) / (CORNER_SINE - FACE_SINE);
-  part = smaller(larger(part, cosine <= 0.0 ? 1.0 : 0.0), 1.0);
+  const double size = fabs(sine);
+  *slope = 0.0;
+  if (size >= CORNER_SINE || cosine <= 0.0) return 1.0;
+  if (size <= FACE_SINE) return 0.0;
+  const double part = (size - FACE_SINE) / (CORNER_SINE - FACE_SINE);
   *slope = 6.0 / (CORNER_SINE - FACE_SINE) * part * (1.0 - part) * cosine;
   return part * part * (3.0 - 2.0 * part);
 }
@@ -131,6 +143,7 @@ static void locate_contact(const dem_corners *plane, long long i)
                                 vector(-local.x, -local.y)};
   dem_vector side[2], bisector[2], mean[2], remaining[2], gradient[2];
   double raised[2], raised_slope[2], overlap_length[2], lying[2], standing[2], rotation[2], rise[2];
+#pragma GCC unroll 2
   for (int s = 0; s < 2; s++) {
     side[s] = scale(-ahead[s], components(plane->edge_direction[sides[s]], direction));
     bisector[s] = vector(ahead[s] + side[s].x, side[s].y);
@@ -138,6 +151,7 @@ static void locate_contact(const dem_corners *plane, long long i)
     remaining[s] = components(to_end[s], mean[s]);
     rise[s] = -side[s].y;
   }
+#pragma GCC unroll 2
   for (int s = 0; s < 2; s++) {
     /* Overlap of the side with the edge, along their mean direction so that the two blocks may swap
      * roles. It runs from the corner, or from the start of the edge if that comes later, to the end
@@ -159,6 +173,7 @@ static void locate_contact(const dem_corners *plane, long long i)
   double length_per_rotation = 0.0, along;
   const double corner_length = standing_length(plane, local.x, edge_length, &along);
   dem_vector length_gradient = vector(standing[0] * standing[1] * along, 0.0);
+#pragma GCC unroll 2
   for (int s = 0; s < 2; s++) {
     const double up = sign_of(rise[s]);
     const double by_tilt =
@@ -336,3 +351,119 @@ EXPORT long long dem_find_candidates(const dem_corners *plane, long long p, cons
   return n_candidates;
 }
 
+/* ------------------------------------------------------------------------- seams */
+
+/* The two edges whose faces meet at contact i, in the order of their blocks. Of the two sides of the
+ * corner, the one with the smaller tilt. */
+static void find_edge_pair(const dem_corners *plane, long long i, long long pair[2])
+{
+  const double *tilt = plane->tilt_sine + i;
+  const long long edge = plane->edge[i], corner = plane->corner[i];
+  const int first_is_flatter = tilt[0] < tilt[plane->n_contacts] - DEM_PARALLEL_SINE;
+  const long long side = first_is_flatter ? plane->previous[corner] : corner;
+  pair[0] = side < edge ? side : edge;
+  pair[1] = side < edge ? edge : side;
+}
+
+/* The edges (k, 2) that meet at all contacts */
+EXPORT void dem_edge_pairs(const dem_corners *plane, long long *pairs)
+{
+  for (long long i = 0; i < plane->n_contacts; i++) find_edge_pair(plane, i, pairs + 2 * i);
+}
+
+/* Number of the law between two edges that meet: of the last table in laws->tables that names their
+ * blocks, else of the joint set that cut both edges, else the default */
+static long long law_of(const dem_corners *plane, const dem_edge_laws *laws, const long long pair[2])
+{
+  const long long a = plane->block[pair[0]], b = plane->block[pair[1]];
+  const long long first = laws->law_of_edge[pair[0]], second = laws->law_of_edge[pair[1]];
+  for (long long t = laws->n_tables - 1; t >= 0; t--) {
+    const long long *table = laws->tables + 3 * t;
+    if ((table[0] < 0 || table[0] == a) && (table[1] < 0 || table[1] == b)) return table[2];
+  }
+  return first == second && first >= 0 ? first : laws->default_law;
+}
+
+/* Laws (m,) between pairs (m, 2) of edges */
+EXPORT void dem_laws_of(const dem_corners *plane, const dem_edge_laws *laws, long long m,
+                        const long long *pairs, long long *law)
+{
+  for (long long i = 0; i < m; i++) law[i] = law_of(plane, laws, pairs + 2 * i);
+}
+
+/* Whether an edge of another block continues an edge across a seam: parallel within 2 degrees, and
+ * the ends at the seam within a skin of each other, and within DEM_MAX_SEAM_STEP of it across */
+static int is_coplanar(const dem_corners *plane, long long edge, long long other, double skin)
+{
+  const dem_vector *start = plane->corner_position;
+  const dem_vector direction = plane->edge_direction[other];
+  const dem_vector angle = components(plane->edge_direction[edge], direction);
+  const dem_vector to_next =
+      components(subtract(start[edge], start[plane->next[other]]), direction);
+  const dem_vector to_previous =
+      components(subtract(start[plane->next[edge]], start[other]), direction);
+  const dem_vector seam = dot(to_next, to_next) < dot(to_previous, to_previous) ? to_next : to_previous;
+  return plane->block[edge] != plane->block[other] && angle.x > 0.0 && fabs(angle.y) <= FACE_SINE &&
+         dot(seam, seam) <= skin * skin && fabs(seam.y) <= DEM_MAX_SEAM_STEP * skin;
+}
+
+/* Contacts whose joints continue the joints of neighbours across a seam, and these neighbours.
+ *
+ * Such a contact bears nothing, and is new or meets between other edges than the ones between which it
+ * was found. It shares an edge with its neighbour, and their other edges belong to two blocks and are
+ * coplanar. The neighbour stores energy, has the law that the edges of the contact need, and is as
+ * deep within DEM_MAX_SEAM_STEP of a skin. Of several ones the nearest is taken.
+ *
+ * Writes contacts, their edges and their neighbours; returns the number of them. */
+EXPORT long long dem_find_neighbours(dem_seams *seams)
+{
+  const dem_corners *plane = (const dem_corners *) seams->corners;
+  long long *rows = seams->rows, *sources = seams->sources;
+  long long m = 0, n_found = 0, pair[2];
+  for (long long i = 0; i < plane->n_contacts; i++) {
+    const double *traction = seams->traction + 2 * i;
+    long long *edges = seams->edges + 2 * m;
+    if (seams->stored_energy[i] != 0.0 || traction[0] != 0.0 || traction[1] != 0.0) continue;
+    find_edge_pair(plane, i, edges);
+    if (!seams->is_new[i] && edges[0] == seams->face_pairs[2 * i] &&
+        edges[1] == seams->face_pairs[2 * i + 1])
+      continue;
+    rows[m] = i;
+    sources[m] = -1;
+    seams->distance[m++] = HUGE_VAL;
+  }
+  if (m == 0) return 0;
+  for (long long side = 0; side < 2 * m; side++) { /* sides of these contacts by their edges */
+    seams->next_side[side] = seams->first_side[seams->edges[side]];
+    seams->first_side[seams->edges[side]] = side;
+  }
+  for (long long i = 0; i < plane->n_contacts; i++) {
+    if (!(seams->stored_energy[i] > 0.0)) continue;
+    find_edge_pair(plane, i, pair);
+    for (int s = 0; s < 2; s++)
+      for (long long side = seams->first_side[pair[s]]; side >= 0; side = seams->next_side[side]) {
+        const long long j = side / 2, row = rows[j], other = seams->edges[4 * j + 1 - side];
+        const double *skins = seams->skins;
+        const double skin = 0.5 * (skins[plane->block_a[row]] + skins[plane->block_b[row]]);
+        const dem_vector apart = subtract(plane->position[i], plane->position[row]);
+        const double distance = sqrt(dot(apart, apart));
+        if (distance < seams->distance[j] &&
+            fabs(plane->closure[i] - plane->closure[row]) <= DEM_MAX_SEAM_STEP * skin &&
+            seams->law[i] == law_of(plane, seams->laws, seams->edges + 2 * j) &&
+            is_coplanar(plane, pair[1 - s], other, skins[plane->block[other]])) {
+          seams->distance[j] = distance;
+          sources[j] = i;
+        }
+      }
+  }
+  for (long long side = 0; side < 2 * m; side++) seams->first_side[seams->edges[side]] = -1;
+  for (long long j = 0; j < m; j++) {
+    if (sources[j] < 0) continue;
+    rows[n_found] = rows[j];
+    sources[n_found] = sources[j];
+    seams->edges[2 * n_found] = seams->edges[2 * j];
+    seams->edges[2 * n_found + 1] = seams->edges[2 * j + 1];
+    n_found++;
+  }
+  return n_found;
+}

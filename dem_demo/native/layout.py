@@ -57,6 +57,7 @@ CONSTANTS = {
     "DIFFERENCE": Constant(1e-6, "rad, and of the strip: motion in differences of areas"),
     "CROSSING_SINE": Constant(1e-3, "sine between two edges that cross"),
     "CROSSING_ERROR": Constant(1e-9, "of the length of an edge: rounding of a distance of blocks"),
+    "MAX_SEAM_STEP": Constant(0.05, "of the skin: step between coplanar edges at a seam"),
     "RANGE_TOLERANCE": Constant(1e-10, "m by which a corner may leave its range: no chatter"),
     "BLOCKS_PER_PART": Constant(BLOCKS_PER_PART, "of a phase of a step"),
     "POINTS_PER_PART": Constant(POINTS_PER_PART, "of a phase of a step"),
@@ -197,6 +198,30 @@ CORNERS = {
     "previous_length": Field("double *", "(k,): m, before the corner went on to another edge"),
     "work_rows": Field("long long *", "(k,): scratch space"),
 }
+EDGE_LAWS = {
+    "default_law": Field("long long", "number of the law of joints that nothing else names"),
+    "law_of_edge": Field("const long long *", "(c,): law of the joint that cut the edge, or -1"),
+    "n_tables": Field("long long", "tables of the scene that name laws of blocks"),
+    "tables": Field("const long long *", "(n_tables, 3): two blocks, -1 for any; law"),
+}
+SEAMS = {
+    "corners": Field("const void *", "dem_corners: the contacts"),
+    "laws": Field("const dem_edge_laws *", ""),
+    "skins": Field("const double *", "(n,): m"),
+    "law": Field("const long long *", "(k,): number of the law"),
+    "stored_energy": Field("const double *", "(k,): J/m2"),
+    "traction": Field("const double *", "(k, 2): normal, shear; Pa"),
+    "face_pairs": Field("const long long *", "(k, 2): edges between which a contact was found"),
+    "is_new": Field("const unsigned char *", "(k,): 1 for a new contact"),
+    # ------------------------------------------------------------------ written
+    "rows": Field("long long *", "(k,): contacts whose joints continue the joints of others"),
+    "edges": Field("long long *", "(k, 2): edges that meet at these contacts"),
+    "sources": Field("long long *", "(k,): contacts whose joints they continue"),
+    # ------------------------------------------------------------------ scratch space
+    "first_side": Field("long long *", "(c,): -1 before and after a call"),
+    "next_side": Field("long long *", "(2 k,)"),
+    "distance": Field("double *", "(k,): m"),
+}
 RELAXED_LAW = {
     "advance": Field("dem_advance *", "takes a step of the law, whose states stay as they are"),
     "batch": Field("void *", "its argument: a batch of virgin joints"),
@@ -310,6 +335,8 @@ STRUCTURES = {
     "dem_law_joints": LAW_JOINTS,
     "dem_step": STEP,
     "dem_corners": CORNERS,
+    "dem_edge_laws": EDGE_LAWS,
+    "dem_seams": SEAMS,
     "dem_relaxed_law": RELAXED_LAW,
     "dem_relaxation": RELAXATION,
     "dem_solids": SOLIDS,

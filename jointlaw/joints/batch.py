@@ -190,6 +190,23 @@ class JointBatch:
         bound_of_unlisted = 0.0 if where is None else self._closure_bound
         self._closure_bound = max(bound_of_unlisted, bound_of_restored)
 
+    def copy(self, sources: Index, targets: Index) -> None:
+        """Let the joints `targets` (m,) become copies of the joints `sources` (m,).
+
+        As `restore(snapshot(sources), targets)`, but a joint may be the source of several copies,
+        and the time does not depend on the number of joints in the batch. sources, targets: joint
+        numbers. Raises ValueError for a wrong number, a joint that is named twice in `targets`, or
+        lists of different lengths; all joints are then as they were.
+        """
+        copied = self._checked_list(sources, can_repeat=True)[0]
+        index = self._index(targets)
+        if copied.shape != index.shape:
+            raise ValueError(
+                f"sources name {len(copied)} joints, targets {len(index)}: give one target for each"
+            )
+        state = self._state
+        state[block_index(state, index)] = state[block_index(state, copied)]
+
     def reset(self, index: Index | None = None, mated: bool = True) -> None:
         """Return the joints at `index` (all if None) to their initial state.
 
@@ -356,8 +373,11 @@ class JointBatch:
     def _index(self, where: Index) -> NDArray[np.intp]:
         return self._checked_list(where)[0]
 
-    def _checked_list(self, where: Index) -> tuple[NDArray[np.intp], int]:
-        """Numbers of the joints `where`, and whether they increase (`ListVerdict`)."""
+    def _checked_list(self, where: Index, can_repeat: bool = False) -> tuple[NDArray[np.intp], int]:
+        """Numbers of the joints `where`, and whether they increase (`ListVerdict`).
+
+        can_repeat: whether the list may name a joint several times.
+        """
         index = np.asarray(where)
         if index.dtype == bool:
             if index.shape != (self._n,):
@@ -368,7 +388,7 @@ class JointBatch:
         if index.ndim != 1 or index.dtype.kind not in "iu":
             raise ValueError("where must be a one-dimensional array of joint numbers or a mask")
         joints = np.ascontiguousarray(index, np.intp)
-        return joints, require_valid_list(self._engine, joints, self._n)
+        return joints, require_valid_list(self._engine, joints, self._n, can_repeat)
 
     def _closure_bound_after(self, step: Step) -> float:
         """Upper bound (m) of |y| over all joints and facets after a step.

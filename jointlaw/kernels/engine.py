@@ -115,17 +115,19 @@ class Step:
         return self.__dict__ | {"call": (None, None, 0, None)}  # a call holds addresses
 
 
-def require_valid_list(kernel: "NumpyEngine | NativeEngine", joints: Index, count: int) -> int:
+def require_valid_list(
+    kernel: "NumpyEngine | NativeEngine", joints: Index, count: int, can_repeat: bool = False
+) -> int:
     """The verdict on a list of joints (m,) of a batch of `count`: `ListVerdict`.
 
-    Raises ValueError if it names a joint twice or a joint outside the batch.
+    Raises ValueError if it names a joint outside the batch or, unless `can_repeat`, a joint twice.
     """
     verdict = kernel.check_list(joints, count)
     if verdict == ListVerdict.OUTSIDE:
         lowest = int(joints.min())
         invalid = lowest if lowest < 0 else int(joints.max())
         raise ValueError(f"where names joint {invalid}; joints are 0 to {count - 1}")
-    if verdict == ListVerdict.REPEATED:
+    if verdict == ListVerdict.REPEATED and not can_repeat:
         raise ValueError("where names a joint twice; each joint takes one increment per step")
     return verdict
 

@@ -131,6 +131,31 @@ def walk(joints, rng, steps=30):
         joints.update(d)
 
 
+def test_copies_of_joints_go_on_as_their_sources_bit_for_bit(any_law):
+    """Across blocks of eight joints; one source has two copies, and one is replaced itself."""
+    batch = any_law.joints(20)
+    walk(batch, np.random.default_rng(3))
+    for sources, targets, message in (
+        ([0, 20], [1, 2], "joint 20"),
+        ([0, 1], [2, -1], "joint -1"),
+        ([0, 1], [2, 2], "twice"),
+        ([0, 1], [2], "sources name 2 joints, targets 1"),
+    ):
+        with refused(batch, message):
+            batch.copy(sources, targets)
+    before = batch.snapshot().values
+    sources, targets = [2, 17, 2, 9], [9, 0, 19, 5]
+    batch.copy(sources, targets)
+    expected = before.copy()
+    expected[targets] = before[sources]
+    np.testing.assert_array_equal(batch.snapshot().values, expected)
+    restored = any_law.joints(20)
+    restored.restore(batch.snapshot())
+    d = np.random.default_rng(4).normal(0.0, 1e-7, np.shape(batch.delta))
+    np.testing.assert_array_equal(batch.update(d)[0], restored.update(d)[0])
+    np.testing.assert_array_equal(batch.snapshot().values, restored.snapshot().values)
+
+
 def test_a_trial_and_copies_leave_a_joint_alone_and_go_the_same_way_bit_for_bit(any_law, tmp_path):
     """A joint that was elsewhere and is restored, one from a file, one that is pickled."""
     joint, restored, from_file = (any_law.joint() for _ in range(3))

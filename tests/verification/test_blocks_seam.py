@@ -284,10 +284,14 @@ def test_neighbours_are_found_as_by_a_loop_over_all_pairs():
     rng = np.random.default_rng(4)
     for _ in range(3):
         bears_load = rng.random(sim.joints.n) < 0.6
-        rows = np.flatnonzero(~bears_load)
-        found = sim.manager.find_neighbours(rows, bears_load)
-        assert found.tolist() == neighbours_one_by_one(sim.manager, rows, bears_load)
-        assert (found >= 0).sum() > 5
+        is_new = rng.random(sim.joints.n) < 0.9
+        sim.manager.bind_joints(2.0 * bears_load, 1e3 * bears_load[:, None] * [1.0, 0.0])
+        rows, sources = sim.manager.find_neighbours(is_new)
+        unloaded = np.flatnonzero(~bears_load & is_new)
+        expected = np.array(neighbours_one_by_one(sim.manager, unloaded, bears_load))
+        assert rows.tolist() == unloaded[expected >= 0].tolist()
+        assert sources.tolist() == expected[expected >= 0].tolist()
+        assert len(rows) > 5
 
 
 def test_laws_of_another_dimension_are_refused():

@@ -15,7 +15,7 @@ against tests that execute it, likely and fast ones first, up to `LIKELY_TIME`. 
 are inserted at once, all test files that can detect one of them are run, and the failing tests are
 run against each fault alone. So every fault meets every test that can detect it, unless two faults
 cancel each other. With `--slow` the faults left then meet the slow tests of all files likewise
-(slow tests are not recorded).
+(slow tests are not recorded). `--since COMMIT` draws only from files that differ from a commit.
 """
 
 import argparse
@@ -256,6 +256,7 @@ def main():
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--reuse-records", action="store_true", help="stale ones too, none is made")
     parser.add_argument("--slow", action="store_true", help="the slow tests too")
+    parser.add_argument("--since", help="faults of outputs in files that differ from this commit")
     options = parser.parse_args()
     if options.outputs:
         try_faults_of_outputs(options)
@@ -292,14 +293,15 @@ def main():
 def try_faults_of_outputs(options):
     """Insert faults of each kind of `tests/output_faults.py`, and print the fate of each."""
     by_kind = all_faults()
-    shares = itertools.cycle(sorted(by_kind))
-    counts = collections.Counter(next(shares) for _ in range(options.count))
-    chosen = []
-    for kind in sorted(by_kind):
-        drawn = random.Random(f"{options.seed} {kind}").sample(by_kind[kind], len(by_kind[kind]))
-        chosen.append(drawn[: counts[kind]])  # a smaller count takes the first ones
-    in_turn = itertools.chain(*itertools.zip_longest(*chosen))
-    faults = [fault for fault in in_turn if fault is not None]
+    if options.since:
+        command = ["git", "diff", "--name-only", options.since]
+        changed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+        files = set(changed.stdout.split())
+        by_kind = {
+            kind: [fault for fault in faults if fault.file in files]
+            for kind, faults in by_kind.items()
+        }
+    faults = draw(by_kind, options.count, options.seed)
     tests = recorded_tests("not slow", options.processes, not options.reuse_records)
     copies = [Copy(f"outputs-{i}") for i in range(options.processes)]
     detected_by = {}
@@ -330,6 +332,18 @@ def try_faults_of_outputs(options):
             del detected_by[fault]
         try_together(copies, undetected, detected_by, "slow", every, options.limit)
         report(by_kind, faults, detected_by)
+
+
+def draw(by_kind, count, seed):
+    """Faults drawn at random, as many of each kind, the kinds in turn."""
+    shares = itertools.cycle(sorted(by_kind))
+    counts = collections.Counter(next(shares) for _ in range(count))
+    chosen = []
+    for kind in sorted(by_kind):
+        drawn = random.Random(f"{seed} {kind}").sample(by_kind[kind], len(by_kind[kind]))
+        chosen.append(drawn[: counts[kind]])  # a smaller count takes the first ones
+    in_turn = itertools.chain(*itertools.zip_longest(*chosen))
+    return [fault for fault in in_turn if fault is not None]
 
 
 def try_together(copies, faults, detected_by, marks, able, limit):

@@ -227,7 +227,7 @@ def picture_faults(source):
                     yield source.exchange("pictures", one, other)
 
 
-def key_faults():
+def key_faults(all_sources):
     """Optional keys of scenes, parameters of law files and options of commands, ignored."""
     import dem_demo.cli
     import dem_demo.scene.keys
@@ -248,7 +248,7 @@ def key_faults():
             yield source.insertion("keys", after, DROP % (path,), what)
     source = Source("jointlaw/parameters/toml.py")
     after = "values = validate_table(table, keys_of(kind), where, path)"
-    for kind in classes_built_from_tables():
+    for kind in classes_built_from_tables(all_sources):
         for name in parameters_of(kind):
             line = (
                 f"\n    if kind.__name__ == {kind.__name__!r}:\n        values.pop({name!r}, None)"
@@ -290,9 +290,9 @@ def optional_paths(rules, refused, above=()):
             yield path
 
 
-def classes_built_from_tables():
+def classes_built_from_tables(all_sources):
     """All classes that declare parameters, but those that read their own table."""
-    for source in sources():
+    for source in all_sources:
         for node in source.tree.body:
             decorators = [ast.unparse(one) for one in getattr(node, "decorator_list", ())]
             methods = [getattr(one, "name", "") for one in getattr(node, "body", ())]
@@ -306,14 +306,14 @@ def table_faults(source):
     Fields of classes that read their own table (`from_table`) have their default, or 1; and keys
     that a function looks for in one of its parameters, a table, are not there.
     """
+    if not re.search(rb"from_table|: Table|: Mapping\[str", source.text):
+        return
     for kind in (node for node in source.tree.body if isinstance(node, ast.ClassDef)):
-        for node in (inner for inner in ast.walk(kind) if isinstance(inner, ast.Return)):
-            method = next(
-                one for one in ast.walk(kind)
-                if isinstance(one, ast.FunctionDef) and node in ast.walk(one)
-            )  # fmt: skip
-            if method.name != "from_table":
-                continue
+        methods = [one for one in kind.body if getattr(one, "name", "") == "from_table"]
+        returns = [
+            one for method in methods for one in ast.walk(method) if isinstance(one, ast.Return)
+        ]
+        for node in returns:
             for item in fields(getattr(importlib.import_module(source.module), kind.name)):
                 is_factory = item.default_factory is not MISSING
                 default = item.default_factory() if is_factory else item.default
@@ -403,13 +403,15 @@ def printed_parts(text):
     item = r"- |\d+\. "  # of a list: a paragraph of its own
     pattern = rf"^.*\S.*$\n?(?:^(?!{item}).*\S.*$\n?)*"
     paragraphs = list(re.finditer(pattern, outside, re.MULTILINE))
+    is_readme = "<!-- test command -->" in text  # a table of validation.md has its commands
+    end = 0
     previous = ""
     for paragraph in paragraphs:
-        is_table = paragraph[0].startswith("|")
-        is_readme = "<!-- test command -->" in text  # a table of validation.md has its commands
-        names_command = COMMAND_ON_PAGE.search(paragraph[0] + (previous if is_table else ""))
-        if names_command or is_readme:
+        follows = not text[end : paragraph.start()].strip()
+        above = previous if paragraph[0].startswith("|") and follows else ""
+        if COMMAND_ON_PAGE.search(paragraph[0] + above) or is_readme:
             yield paragraph.span()
+        end = paragraph.end()
         previous = paragraph[0]
 
 
@@ -432,11 +434,11 @@ def page_faults():
 def all_faults():
     """Faults by kind."""
     faults = defaultdict(list)
-    for source in sources():
+    all_sources = [*sources()]
+    for source in all_sources:
         for find in (column_faults, unit_faults, picture_faults, table_faults):
             for fault in find(source):
                 faults[fault.kind].append(fault)
-    for find in (key_faults, state_faults, page_faults):
-        for fault in find():
-            faults[fault.kind].append(fault)
+    for fault in itertools.chain(key_faults(all_sources), state_faults(), page_faults()):
+        faults[fault.kind].append(fault)
     return {kind: sorted({*found}) for kind, found in faults.items()}

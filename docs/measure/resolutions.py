@@ -8,6 +8,7 @@ python docs/measure/resolutions.py reduced-models [--rounds 6] [--seconds 0.1]
 """
 
 import os
+import re
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -56,6 +57,8 @@ def named():
             errors.append(f"{100 * suite.errors(variant).traction.max():.2f}")
         rows.append([preset, *errors])
     print_table(["preset", *NAMED_RESOLUTIONS], [*rows, ["sliders, at most", *sliders.values()]])
+    random_paths = [name for name in suite.names if re.fullmatch(r"(excursion|slip) \d+", name)]
+    print(f"{len(random_paths)} of the {len(suite.names)} paths are random")
 
 
 def cost_list():

@@ -4,6 +4,10 @@ import hypothesis
 import kinds
 import pytest
 
+from jointlaw.support.pyplot import STYLE
+
+RESOLUTION = STYLE["savefig.dpi"]
+
 # Derandomized: the same cases on every machine, so that a failure is a change of the code.
 hypothesis.settings.register_profile(
     "jointlaw", deadline=None, max_examples=40, derandomize=True, database=None
@@ -41,6 +45,21 @@ def moved(law):
     batch = law.joints(5)
     batch.update([[1e-7 * (i + 1), 5e-8 * i, -2e-8 * i] for i in range(5)])
     return batch
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _coarse_pictures():
+    """Pictures that tests save have few pixels, as encoding them takes most of the time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(STYLE, "savefig.dpi", 60)
+        yield
+
+
+@pytest.fixture
+def full_resolution(monkeypatch):
+    """Pictures are saved as for users; the resolution in dots per inch."""
+    monkeypatch.setitem(STYLE, "savefig.dpi", RESOLUTION)
+    return RESOLUTION
 
 
 @pytest.fixture

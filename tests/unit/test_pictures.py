@@ -106,6 +106,15 @@ def test_picture_of_a_shear_test():
     assert figure.get_suptitle().endswith(f"largest friction angle {angles.max():.1f}°")
 
 
+def test_pictures_have_300_dots_per_inch(full_resolution, tmp_path):
+    """The file has as many pixels and says so; the picture is 7.5 inches wide or less."""
+    assert full_resolution == 300
+    jl.closure_test(jl.presets.load("linear-a3").joint(), 1e6, steps=3).plot(tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.info["dpi"] == pytest.approx((300, 300), rel=1e-3)
+        assert 5 * 300 < picture.width <= 7.5 * 300
+
+
 def test_picture_of_a_closure_test():
     columns = SHEAR_RECORD | {"shear_2": np.zeros(4), "F2": np.zeros(4)}
     figure = TestRecord(columns, 0.0, "closure").plot()

@@ -59,7 +59,7 @@ def test_shear_example_runs(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("line", "status"),
-    [("jointlaw card westerly-smooth", 141), ("jointlaw --help", 0), ("dem_demo check slope", 141)],
+    [("jointlaw card linear-a3", 141), ("jointlaw --help", 0), ("dem_demo check shear-box", 141)],
 )
 def test_a_reader_that_ends_early_gives_no_error(line, status):
     """As by `| head -1`: nothing on the standard error stream, the status of SIGPIPE."""

@@ -145,8 +145,9 @@ def on_incline(degrees, azimuth):
     return block, down
 
 
-@pytest.mark.parametrize("azimuth", [0.0, 0.7, -2.0])
-@pytest.mark.parametrize("degrees", [30.9, 31.1, 35.0])
+@pytest.mark.parametrize(
+    ("degrees", "azimuth"), [(30.9, 0.7), (31.1, 0.0), (31.1, -2.0), (35.0, 0.7), (35.0, -2.0)]
+)
 def test_block_on_an_incline(degrees, azimuth):
     """Friction of 0.6 carries the block up to 30.964 degrees. Beyond, it moves down the dip line by
     g (sin - 0.6 cos) t^2/2, along any direction between the axes of the law."""

@@ -74,6 +74,12 @@ WRONG = [
     ("step = 1e-4", "fraction = 2.0", "fraction = 2.0: must be from 1e-06 to 0.95"),
     ("law_steps = 2", "law_steps = 2.9", "law_steps = 2.9 .* whole number >= 1"),
     ("[run]", "[run", "at line 34"),
+    ("[run]", '[in_situ]\nbottom = "fixed"\n[run]', "give either k0 or stress"),
+    (
+        'block = "top"\nmotion = "x"',
+        'motion = "x"\nreverse = { block = "top", slip = 1.0, by = 1.0, duration = 1.0 }',
+        "name one; .* without `reverse`",
+    ),
     ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", "laws.x = 1: must be a table"),
     ("mu = 0.4", "mu = -0.4", "mu"),
     ("mating_length = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
@@ -191,6 +197,12 @@ def test_errors_name_the_invalid_value(text, old, new, message):
 def test_lists_of_tables_hold_tables(table):
     with pytest.raises(ValueError, match=rf"scene: .*{table}\[0\].* must be a table"):
         build({**tomllib.loads(TEXT), table: [1]})
+
+
+def test_the_skin_of_a_run_sets_the_length_of_soft_contacts():
+    scene = parse(TEXT.replace("[run]", "[run]\nskin = 0.012"), "scene.toml")
+    assert scene.run.skin == 0.012
+    assert scene.run.soft == pytest.approx(0.25 * 0.012)
 
 
 def test_a_variant_changes_what_it_names():

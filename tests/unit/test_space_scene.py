@@ -53,6 +53,14 @@ def test_blocks_of_all_shapes():
     assert scene.gravity.tolist() == [0.0, 0.0, -9.81]
 
 
+def test_a_fixed_block_has_no_motions_of_its_own():
+    motions = {"fixed_motions": ["x"]}
+    moving = block("moving", box=[1, 1, 1], at=[2, 0, 0.5], **motions)
+    scene = parse(LAWS + BASE.rstrip() + '\nfixed_motions = ["x"]\n' + moving)
+    assert scene.blocks[0].prescribed == ()
+    assert len(scene.blocks[1].prescribed) == 1
+
+
 def test_a_scene_in_the_plane_is_read_as_before():
     text = "[laws.plain]\n" + coulomb() + block("base", box=[4, 1], fixed=True)
     text += block("block", box=[1, 1], at=[0, 1]) + "[run]\nend = 1\n"
@@ -120,6 +128,8 @@ DENTED = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)] + [[0.5, 0.
         (BLOCK + block("thin", box=[1, 1, 0]), "sides must be above 0"),
         (BLOCK + block("none"), "one of `box`"),
         (BLOCK + block("two", box=[1, 1, 1], file="a.obj"), "one of `box`"),
+        (BLOCK + block("moved", corners=DENTED[:8], at=[0, 0, 9]), r"one of `box` \(with `at`\)"),
+        (BLOCK + '[in_situ]\nbottom = "fixed"\n', "either k0 or stress"),
         (BLOCK + block("turned", box=[1, 1, 1], angle=3), "'block.2..angle' is unknown"),
         (BLOCK + BLOCK, "'block' is given twice"),
         (BLOCK + block("fast", box=[1, 1, 1], velocity=[1, 0, 0]), "'fast'.*run.end is missing"),

@@ -48,11 +48,13 @@ class Flight:
     velocity = np.array([2.0, -1.5, 0.7])
     spin = np.array([0.0, 2.0, 0.0])
     load = np.array([720.0, -480.0, 240.0])
+    arm = np.array([0.3, 0.2, -0.15])  # of the history point from the centroid
     text = (
         lines(title=title, gravity=gravity, density=density)
         + f"[laws.plain]\n{coulomb()}"
         + block("ground", box=ground_box, at=ground, fixed=True)
         + block("flyer", box=box, at=start, velocity=velocity, spin=spin, load=load)
+        + f"[monitor]\n{lines(points=[start + arm])}"
         + f"[run]\nend = {end}\nrecord = 0.1\nstep = {time_step}\nskin = 0.05\n"
     )
     mass = density * box.prod()
@@ -88,6 +90,22 @@ class Flight:
             "turnover": at_rest + (fallen + 2 * risen) * (t > 0) + work,
         }
 
+    def turned(self, points, t):
+        """Vectors (n, 3) of the block as drawn, turned as at a time (s)."""
+        x, y, z = np.transpose(points)
+        cosine, sine = np.cos(self.spin[1] * t), np.sin(self.spin[1] * t)
+        return np.column_stack([cosine * x + sine * z, y, cosine * z - sine * x])
+
+    def readings(self, t):
+        """Columns of the history point."""
+        (arm,) = self.turned([self.arm], t)
+        place = self.start + self.flown(t) + arm
+        velocity = self.velocity_at(t) + np.cross(self.spin, arm)
+        values = dict(zip(("x_m", "y_m", "z_m"), place, strict=True))
+        values |= dict(zip(("vx_m/s", "vy_m/s", "vz_m/s"), velocity, strict=True))
+        values["displacement_m"] = np.linalg.norm(place - self.start - self.arm)
+        return {f"point 1: {name}": value for name, value in values.items()}
+
     def motion(self):
         """Values of blocks.csv and blocks.vtu at the end."""
         flown = self.flown(self.end)
@@ -106,11 +124,7 @@ class Flight:
     def corners(self):
         """Corners (8, 3) of the flyer at the end, as a set of rows."""
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        x, y, z = (0.5 * signs * self.box).T
-        angle = self.spin[1] * self.end
-        cosine, sine = np.cos(angle), np.sin(angle)
-        turned = np.column_stack([cosine * x + sine * z, y, cosine * z - sine * x])
-        return self.start + self.flown(self.end) + turned
+        return self.start + self.flown(self.end) + self.turned(0.5 * signs * self.box, self.end)
 
     def summary(self):
         x, y, z = self.start
@@ -386,6 +400,8 @@ def test_every_column_of_history(written):
         expected["turnover_J"] = energies["turnover"], TURNOVER * energies["turnover"]
         error = scene.energy_error(t)
         expected |= {"time_s": (t, ROUNDING), "energy_error": (error, ROUNDING + 1e-3 * error)}
+        readings = getattr(scene, "readings", lambda t: {})(t)
+        expected |= {name: (value, ROUNDING) for name, value in readings.items()}
         compare(row, expected, f"history.csv at {t:g} s")
 
 

@@ -15,7 +15,7 @@ against tests that execute it, likely and fast ones first, up to `LIKELY_TIME`. 
 are inserted at once, all test files that can detect one of them are run, and the failing tests are
 run against each fault alone. So every fault meets every test that can detect it, unless two faults
 cancel each other. With `--slow` the faults left then meet the slow tests of all files likewise
-(slow tests are not recorded). `--since COMMIT` draws only from files that differ from a commit.
+(slow tests are not recorded). `--since COMMIT` draws only from lines that differ from a commit.
 """
 
 import argparse
@@ -256,7 +256,7 @@ def main():
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--reuse-records", action="store_true", help="stale ones too, none is made")
     parser.add_argument("--slow", action="store_true", help="the slow tests too")
-    parser.add_argument("--since", help="faults of outputs in files that differ from this commit")
+    parser.add_argument("--since", help="faults of outputs in lines that differ from this commit")
     options = parser.parse_args()
     if options.outputs:
         try_faults_of_outputs(options)
@@ -294,11 +294,9 @@ def try_faults_of_outputs(options):
     """Insert faults of each kind of `tests/output_faults.py`, and print the fate of each."""
     by_kind = all_faults()
     if options.since:
-        command = ["git", "diff", "--name-only", options.since]
-        changed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
-        files = set(changed.stdout.split())
+        lines = changed_lines(options.since)
         by_kind = {
-            kind: [fault for fault in faults if fault.file in files]
+            kind: [fault for fault in faults if changes_line(fault, lines)]
             for kind, faults in by_kind.items()
         }
     faults = draw(by_kind, options.count, options.seed)
@@ -332,6 +330,30 @@ def try_faults_of_outputs(options):
             del detected_by[fault]
         try_together(copies, undetected, detected_by, "slow", every, options.limit)
         report(by_kind, faults, detected_by)
+
+
+def changed_lines(commit):
+    """Numbers of the lines, by file, that differ from a commit."""
+    command = ["git", "diff", "-U0", commit]
+    diff = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    lines = collections.defaultdict(set)
+    file = ""
+    for name, first, count in re.findall(
+        r"^(?:\+\+\+ b/(.*)|@@ -\S+ \+(\d+)(?:,(\d+))? @@.*)$", diff, re.MULTILINE
+    ):
+        file = name or file
+        if first:
+            lines[file] |= set(range(int(first), int(first) + int(count or 1)))
+    return lines
+
+
+def changes_line(fault, lines):
+    """Whether a fault begins in one of the lines; lines that it inserts may be anywhere in a file
+    with some."""
+    if fault.start == fault.end:
+        return bool(lines[fault.file])
+    text = (ROOT / fault.file).read_bytes()
+    return text[: fault.start].count(b"\n") + 1 in lines[fault.file]
 
 
 def draw(by_kind, count, seed):

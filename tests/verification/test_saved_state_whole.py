@@ -373,8 +373,13 @@ def test_single_numbers_are_restored(scene, simulations):
     sim, _ = simulations[scene]
     state = sim.state()
     names = [name for name in sim.state_paths if state[name].shape == ()]
-    changed = {name: state[name] + 0.5 for name in names if state[name].dtype.kind == "f"}
-    assert "water_time" in changed
+    differences = {"f": 0.5, "i": 1}
+    changed = {
+        name: state[name] + differences[state[name].dtype.kind]
+        for name in names
+        if state[name].dtype.kind in differences
+    }
+    assert {"water_time", "halvings_left"} <= {*changed}
     restored = new_simulation(sim.scene, state | changed).state()
     assert {name: restored[name] for name in changed} == changed
 

@@ -20,6 +20,8 @@ from scene_text import block, coulomb, lines
 
 from dem_demo.cli import main
 from dem_demo.output.run import SUMMARY_VERSION
+from dem_demo.space import SpaceSimulation, parse
+from dem_demo.space.record import read_joints
 
 ROUNDING = 1e-9
 TURNOVER = 1e-4  # relative: a sum over steps
@@ -403,6 +405,18 @@ def test_every_column_of_history(written):
         readings = getattr(scene, "readings", lambda t: {})(t)
         expected |= {name: (value, ROUNDING) for name, value in readings.items()}
         compare(row, expected, f"history.csv at {t:g} s")
+
+
+def test_fractions_of_joints_by_their_names():
+    """They are equal in the scenes above."""
+    sim = SpaceSimulation(parse(Resting.text))
+    fractions = {"sliding": 0.25, "slipping": 0.5, "separated": 0.75}
+    for name, value in fractions.items():
+        getattr(sim.joints, name)[:] = value
+    joints = read_joints(sim)
+    assert {name: [*joints[name]] for name in fractions} == {
+        name: 4 * [value] for name, value in fractions.items()
+    }
 
 
 def test_every_column_of_blocks(written):

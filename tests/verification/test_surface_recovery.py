@@ -301,6 +301,7 @@ def test_every_format_gives_the_same_array(tmp_path):
         ("z.asc", "ncols 3\nnrows 2\n1 2\n3 4\n", "it has 2 cols, its header says 3: .* not whole"),
         ("z.asc", "dx 20\ndy 40\n1.5 2\n", "its points are no square grid: dx 20, dy 40"),
         ("z.asc", "dx 40\ndy 40\n1.5 2\n", "its cellsize 40 is 4e-05 m .*--spacing is 2e-05"),
+        ("z.asc", "dx 20.1\ndy 20.1\n1.5 2\n", "its cellsize 20.1 is 2.01e-05 m"),
         ("n.csv", "1,5,6,5\n2,6,5,6\n3,5,6,5\n4,7,6,6\n", "its first column counts"),
         ("p.csv", "0,.02,.04,.06,.08\n5,5,6,5,8\n2,6,5,6,7\n3,9,6,4,5\n", "its first row counts"),
         (

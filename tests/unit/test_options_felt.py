@@ -210,6 +210,7 @@ REFUSALS = ("called with", "the fitted a = ")  # of work that is replaced; of he
 FROM_FIELD = cache(jointlaw.cli.field.from_field)
 SHEAR_PAST_PEAK = cache(jointlaw.cli.field.shear_past_peak)
 PRESENT = {}  # outcomes of lines without an option
+REPEATED = set()  # commands of which a line has run twice, with the same outcome
 
 
 def commands():
@@ -451,7 +452,10 @@ def test_every_option_is_felt(main, pair, outcome):
         alternative = f"{line} {alternative}"
     if line not in PRESENT:
         PRESENT[line] = outcome(main, line)
-        assert outcome(main, line) == PRESENT[line]  # nothing else makes a difference
+        command = " ".join(line.split()[: 2 if line.startswith("export") else 1])
+        if command not in REPEATED:  # nothing else makes a difference
+            REPEATED.add(command)
+            assert outcome(main, line) == PRESENT[line]
     present = PRESENT[line]
     felt = outcome(main, alternative)
     assert felt[0] == 0 or any(text in felt[2] for text in REFUSALS), felt[2]

@@ -150,7 +150,7 @@ def test_the_law_agrees_with_an_independent_model(kind, dim, seed):
     legs = rng.normal(size=(6, dim)) * [2e-4, *[6e-4] * (dim - 1)] + [[2e-4, *no_shear]] * 6
     legs[3, 0] = -4e-4
     joint = law.joint()
-    for leg, (F, w, dissipation) in zip(legs, coulomb_model(law, legs, 4000), strict=True):
+    for leg, (F, w, dissipation) in zip(legs, coulomb_model(law, legs, 2000), strict=True):
         for _ in range(500):
             joint.update(leg / 500, tangent=False)
         scale = max(COHESION, np.abs(F).max())
@@ -407,7 +407,7 @@ def test_peak_and_residual_of_bond_and_friction(name, toughness):
     energies = 0.5 * toughness * np.array([T, c]) * length
     bond = jl.Bond(T / length, c / length, T, c, *energies)
     slip = 40.0 * unbonded.closure_range
-    for stress in (0.3e6, 1e6, 3e6, 10e6, 30e6):
+    for stress in (0.3e6, 1e6, 3e6, 10e6, 30e6) if toughness > 1.0 else (0.3e6, 3e6, 30e6):
         friction, bonded = (
             jl.direct_shear(law.joint(), slip, stress, steps=400).shear_stress
             for law in (unbonded, replace(unbonded, bond=bond))

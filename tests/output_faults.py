@@ -19,6 +19,7 @@ import itertools
 import re
 from collections import defaultdict
 from dataclasses import MISSING, fields
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -77,6 +78,11 @@ class Source:
         self.tree = ast.parse(self.text)
         lines = self.text.splitlines(keepends=True)
         self.line_starts = [0, *itertools.accumulate(map(len, lines))]
+
+    @cached_property
+    def nodes(self):
+        """All nodes of the tree."""
+        return [*ast.walk(self.tree)]
 
     def span(self, node):
         return (
@@ -145,12 +151,12 @@ def column_faults(source):
         return
     synonyms = {  # other names of one column, in any order
         one
-        for node in ast.walk(source.tree)
+        for node in source.nodes
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "Quantity"
         for one in node.args
     }
     tables = {value for name, value in constants_of_module(source) if TABLE_NAME.match(name)}
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.Dict):
             names = texts(node.keys)
             if has_unit(names) or node in tables:
@@ -177,7 +183,7 @@ def unit_faults(source):
         elif isinstance(inner.value, str) and re.match(r"[\d.]+[a-zA-Z]", inner.value):
             number, unit = re.fullmatch(r"([\d.]+)(.*)", inner.value).groups()
             yield source.replacement("units", inner, f'"{10 * float(number):.7g}{unit}"')
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
             for side in (node.left, node.right):
                 if isinstance(side, ast.Constant) and side.value in POWERS_OF_TEN:
@@ -193,7 +199,7 @@ def picture_faults(source):
     """Signs and order of the data of artists, and units in the labels, where pictures are made."""
     calls = [
         node
-        for node in ast.walk(source.tree)
+        for node in source.nodes
         if isinstance(node, ast.Call)
         and ast.unparse(node.func).rpartition(".")[2] in ARTISTS
         and (node.args or node.keywords)
@@ -208,8 +214,8 @@ def picture_faults(source):
             yield source.replacement("pictures", one, f"(-1 * ({source.source(one)}))")
         if len(data) >= 2:
             yield source.exchange("pictures", *data[:2])
-    docstrings = {node.value for node in ast.walk(source.tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(source.tree):
+    docstrings = {node.value for node in source.nodes if isinstance(node, ast.Expr)}
+    for node in source.nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             if node in docstrings:
                 continue
@@ -322,7 +328,7 @@ def table_faults(source):
                 new = f'__import__("dataclasses").replace({made}, {item.name}={value})'
                 what = f"{kind.name}.{item.name} is ignored"
                 yield source.replacement("keys", node.value, new, what)
-    for function in (one for one in ast.walk(source.tree) if isinstance(one, ast.FunctionDef)):
+    for function in (one for one in source.nodes if isinstance(one, ast.FunctionDef)):
         tables = {
             one.arg for one in function.args.args
             if one.annotation and re.match(r"Tables?$|Mapping\[str", ast.unparse(one.annotation))
@@ -360,7 +366,7 @@ def state_faults():
             what = f"{path} of {kind.__name__} is not restored"
             yield source.insertion("state", "for path in self.state_paths:\n", line, what)
     source = Source("dem_demo/contact/joints.py")
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.FunctionDef) and node.name == "restore":
             for statement in node.body:
                 if isinstance(statement, ast.Assign) and "self" in ast.unparse(statement.targets):

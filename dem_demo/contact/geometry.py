@@ -11,7 +11,10 @@ The length of joint that a contact stands for therefore depends on how the corne
 
 - a side of the corner that lies on the edge, tilted by less than 2 degrees: half of its overlap;
 - a corner that stands on the edge, its sides tilted by more than 5 degrees: a fixed length;
-- in between, and within `transition_length` of the end of an edge: a smooth interpolation.
+- in between, a smooth interpolation;
+- within `transition_length` of the end of an edge, where the side over the edge is raised by more
+  than 30 degrees: less, none at the end, where blocks meet in a point. Up to 20 degrees the length
+  is kept, so that a block rocks on the end of another one.
 
 Any change of this length changes the stored energy of the contact. Minus the stored energy per
 length times the derivative of the length is hence a force, which acts on the two blocks

@@ -53,6 +53,7 @@ FRACTIONS_OF_LIMIT = {  # time step relative to its limit, by what can happen
 }
 IMPACT_STRESS = 1e4  # Pa: normal stress of a first impact, where nothing touches at the start
 IDLE_SHARE = 1e-6  # of it: the stress of faces drawn on each other, which touch by rounding
+IDLE_AREA = 1e-9  # m2: of a corner that touches the end of an edge
 MAX_HALVINGS = 8  # of a time step that was chosen automatically
 FILE = "state.npz"
 VERSION = 14
@@ -408,9 +409,13 @@ class Simulation:
         return FRACTIONS_OF_LIMIT[self.fraction_reason] * limit
 
     def _is_untouched(self, impact_stiffness: float) -> bool:
-        """Whether no joint bears a load yet, and all are softer than in an impact (Pa/m)."""
+        """Whether no joint bears a load yet, and all are softer than in an impact (Pa/m).
+
+        A corner that is drawn on the end of an edge has no area yet, so its joint is soft.
+        """
         joints = self.joints
-        stiffness = joints.interpolate("stiffness", "closure", self.contacts.closure)
+        has_area = self.contacts.area > IDLE_AREA
+        stiffness = has_area * joints.interpolate("stiffness", "closure", self.contacts.closure)
         largest_stress = np.abs(joints.traction).max(initial=0.0)
         is_idle = largest_stress < IDLE_SHARE * IMPACT_STRESS
         return is_idle and stiffness.max(initial=0.0) < impact_stiffness

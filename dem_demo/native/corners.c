@@ -11,6 +11,8 @@
 
 #define FACE_SINE 0.03489949670250097   /* of 2 degrees: up to this tilt an edge lies on another */
 #define CORNER_SINE 0.08715574274765817 /* of 5 degrees: from this tilt on only its corner touches */
+#define SLIM_SINE 0.3420201433256687    /* of 20 degrees: up to it a corner bears at the end of an edge */
+#define POINT_SINE 0.5                  /* of 30 degrees: from it on blocks meet in a point there */
 #define MIN_OVERLAP 1e-10               /* m: shorter overlaps are rounding */
 #define LEVEL_SINE 1e-6                 /* least sine of a tilt beyond the limit of a range */
 #define MAX_TRANSFERS 8                 /* edges that a corner may go on by in a step */
@@ -64,19 +66,32 @@ static inline double smooth_size(double x, double width, double *slope)
   return size * part * (2.0 - part);
 }
 
-/* Length of joint (m) at a corner that stands on an edge at x (m) along it: none at the ends of the
- * edge, where blocks meet in a point. Writes its derivative by x. */
-static double standing_length(const dem_corners *plane, double x, double edge_length, double *slope)
+/* Share of its length of joint that a corner keeps at the end of the edge: 1 where the side of the
+ * corner along the edge is raised by up to 20 degrees, 0 from 30 degrees on. Writes its derivative by
+ * the tilt (1/rad). */
+static double share_at_end(double sine, double cosine, double *slope)
+{
+  *slope = 0.0;
+  if (sine >= POINT_SINE || cosine <= 0.0) return 0.0;
+  if (sine <= SLIM_SINE) return 1.0;
+  const double part = (POINT_SINE - sine) / (POINT_SINE - SLIM_SINE);
+  *slope = -6.0 / (POINT_SINE - SLIM_SINE) * part * (1.0 - part) * cosine;
+  return part * part * (3.0 - 2.0 * part);
+}
+
+/* Length of joint (m) at a corner that stands on an edge at x (m) along it, with the share of it that
+ * is kept at the end of the edge. Writes its derivatives by x and by this share. */
+static double standing_length(const dem_corners *plane, double x, double edge_length, double share,
+                              double *slope, double *by_share)
 {
   const double width = smaller(plane->transition_length, 0.5 * edge_length);
   const double to_end = edge_length - x;
-  const double to_nearer_end = smaller(x, to_end);
-  *slope = 0.0;
-  if (to_nearer_end >= width) return plane->corner_length;
-  if (to_nearer_end <= 0.0) return 0.0;
-  const double part = to_nearer_end / width;
-  *slope = plane->corner_length * 6.0 * part * (1.0 - part) / (x < to_end ? width : -width);
-  return plane->corner_length * part * part * (3.0 - 2.0 * part);
+  const double part = larger(smaller(smaller(x, to_end) / width, 1.0), 0.0);
+  const double length = plane->corner_length * part * part * (3.0 - 2.0 * part);
+  *slope = (1.0 - share) * plane->corner_length * 6.0 * part * (1.0 - part) /
+           (x < to_end ? width : -width);
+  *by_share = plane->corner_length - length;
+  return length + share * *by_share;
 }
 
 /* 0 for a side that lies on the edge, 1 for one that is raised; writes its derivative by the tilt
@@ -170,9 +185,19 @@ static void locate_contact(const dem_corners *plane, long long i)
     lying[s] = overlap > MIN_OVERLAP ? 0.5 * (1.0 - raised[s]) : 0.0;
     standing[s] = rise[s] > 0.0 ? raised[s] : 0.0;
   }
-  double length_per_rotation = 0.0, along;
-  const double corner_length = standing_length(plane, local.x, edge_length, &along);
-  dem_vector length_gradient = vector(standing[0] * standing[1] * along, 0.0);
+  /* Two blocks of which one stands on the end of the other, such as columns that rock, bear on each
+   * other there. Blocks that meet in a point, such as the ones around a wedge, do not. Side `inward`
+   * of the corner extends from the nearer end over the edge. */
+  const int inward = local.x < edge_length - local.x ? 0 : 1;
+  const double both = standing[0] * standing[1];
+  double corner_length = plane->corner_length, along = 0.0, by_share = 0.0, share_slope = 0.0;
+  if (!(smaller(local.x, edge_length - local.x) >= width)) {
+    const double share =
+        share_at_end(rise[inward], ahead[inward] * side[inward].x, &share_slope);
+    corner_length = standing_length(plane, local.x, edge_length, share, &along, &by_share);
+  }
+  double length_per_rotation = -ahead[inward] * both * by_share * share_slope;
+  dem_vector length_gradient = vector(both * along, 0.0);
 #pragma GCC unroll 2
   for (int s = 0; s < 2; s++) {
     const double up = sign_of(rise[s]);
@@ -197,7 +222,7 @@ static void locate_contact(const dem_corners *plane, long long i)
         -dot(to_end[1 - s], toward) * (corner_next ? fabs(rise[s]) + LEVEL_SINE : 1.0);
   }
   plane->length[i] = plane->overlap_length[i] + plane->overlap_length[k + i] +
-                     corner_length * standing[0] * standing[1];
+                     corner_length * both;
   plane->position[i] = position;
   plane->normal[i] = vector(sign * direction.y, -sign * direction.x);
   plane->closure[i] = local.y;

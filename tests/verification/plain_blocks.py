@@ -4,11 +4,15 @@ import numpy as np
 
 FACE_TILT = 2.0  # degrees: up to this tilt an edge lies on another
 CORNER_TILT = 5.0  # degrees: from this tilt on only its corner touches
+SLIM_TILT = 20.0  # degrees: up to this tilt a corner has its length of joint at the end of an edge
+POINT_TILT = 30.0  # degrees: from this tilt on it has none there
 PARALLEL_SINE = 1e-9  # sine of an angle that differs from 0 by rounding only
 MIN_OVERLAP = 1e-10  # m: shorter overlaps are rounding
 LEVEL_SINE = 1e-6  # least sine of a tilt, for corners beyond the limit of their range
 _FACE_SINE = np.sin(np.radians(FACE_TILT))
 _CORNER_SINE = np.sin(np.radians(CORNER_TILT))
+_SLIM_SINE = np.sin(np.radians(SLIM_TILT))
+_POINT_SINE = np.sin(np.radians(POINT_TILT))
 _AHEAD = np.array([[1.0], [-1.0]])  # sides of a corner: towards the edge's end, and its start
 _END = np.array([[1.0], [0.0]])
 
@@ -47,11 +51,16 @@ class PlainContacts:
         tilt_cosine = _AHEAD * side.real
         whole_side = o.edge_length[self.sides] * side
         overlap, gradient, rotation = _overlaps(to_end, whole_side, mean, o.transition_length)
-        standing, along = _standing_length(
-            o.corner_length, o.transition_length, local.real, o.edge_length[edge]
+        is_near_start = local.real < o.edge_length[edge] - local.real
+        inward = np.where(is_near_start, 0, 1), np.arange(len(corner))
+        share, by_tilt = _share_at_end(self.tilt_sine[inward], tilt_cosine[inward])
+        standing, along, by_share = _standing_length(
+            o.corner_length, o.transition_length, local.real, o.edge_length[edge], share
         )
+        # as the block rotates, the tilt of the first side falls, the tilt of the second rises
+        turning = -np.where(is_near_start, 1.0, -1.0) * by_tilt * by_share
         self.length, self.overlap_length, gradient, rotation = _lengths(
-            standing, along, self.tilt_sine, tilt_cosine, overlap, gradient, rotation
+            standing, along, turning, self.tilt_sine, tilt_cosine, overlap, gradient, rotation
         )
         # At its limit the range of the corner meets another one: of the next corner, along a side
         # of this corner, or of the next edge. The one that is rotated less comes next, and the
@@ -114,21 +123,35 @@ def _overlaps(to_end, whole_side, mean, transition_length):
     return overlap, -(by_end + by_start) * mean, 0.5 * rotation
 
 
-def _standing_length(corner_length, transition_length, x, edge_length):
-    """Length of joint (k,) at corners that stand at x on edges, and its derivative by x.
+def _share_at_end(sine, cosine):
+    """Share (k,) of its length of joint that a corner keeps at the end of an edge, by the tilt of
+    its side over the edge; and its derivative by the tilt (1/rad)."""
+    part = np.clip((_POINT_SINE - sine) / (_POINT_SINE - _SLIM_SINE), 0, 1) * (cosine > 0)
+    slope = -6 * part * (1 - part) / (_POINT_SINE - _SLIM_SINE) * cosine
+    return part * part * (3 - 2 * part), slope
 
-    Zero at the ends of an edge, where blocks meet in a point; whole from the transition length on.
+
+def _standing_length(corner_length, transition_length, x, edge_length, share):
+    """Length of joint (k,) at corners that stand at x on edges, its derivatives by x and by the
+    share that is kept at the ends of an edge.
+
+    Beyond the transition length from the ends it is whole.
     """
     width = np.minimum(transition_length, 0.5 * edge_length)
     to_end = edge_length - x
     part = np.clip(np.minimum(x, to_end) / width, 0, 1)
     slope = np.where(x < to_end, 1, -1) * 6 * part * (1 - part) / width
-    return corner_length * part * part * (3 - 2 * part), corner_length * slope
+    kept = part * part * (3 - 2 * part)
+    length = corner_length * (kept + share * (1 - kept))
+    return length, corner_length * (1 - share) * slope, corner_length * (1 - kept)
 
 
-def _lengths(standing, along, tilt_sine, tilt_cosine, overlap, gradient, rotation):
+def _lengths(standing, along, turning, tilt_sine, tilt_cosine, overlap, gradient, rotation):
     """Length of joint at the corners, the part of each side, and derivatives of the length by
-    displacement and rotation of the corner's block."""
+    displacement and rotation of the corner's block.
+
+    along, turning: derivatives of `standing` by the position along the edge and by the rotation.
+    """
     is_up = tilt_sine > 0
     raised, slope = _raised_fraction(tilt_sine, tilt_cosine)
     overlap_length = np.maximum(overlap, 0.0)
@@ -138,6 +161,7 @@ def _lengths(standing, along, tilt_sine, tilt_cosine, overlap, gradient, rotatio
     # The tilt of the first side falls as the corner's block rotates, the tilt of the second rises.
     by_tilt = standing * is_up * stands[::-1] - 0.5 * overlap_length * np.sign(tilt_sine)
     total_rotation = (lies * rotation - _AHEAD * slope * by_tilt).sum(axis=0)
+    total_rotation = total_rotation + stands.prod(axis=0) * turning
     total_gradient = (lies * gradient).sum(axis=0) + stands.prod(axis=0) * along
     return length, lies * overlap_length, total_gradient, total_rotation
 

@@ -16,7 +16,7 @@ from scene_text import ROCK, block, coulomb, lines, on_base
 
 from dem_demo import SceneError, Simulation, load, parse
 from dem_demo.compiled import CornerArrays, LawJointArrays, StepArrays
-from dem_demo.contact import tabulate_first_loading
+from dem_demo.contact import Contacts, tabulate_first_loading
 from dem_demo.dynamics import simulation
 from dem_demo.native import build, layout
 from dem_demo.scene import Files, build_law
@@ -36,6 +36,11 @@ def test_critical_damping_of_all_joints_of_a_block_adds_up():
 # a block that falls on its corner, at tilts of its lower edge between lying and raised
 ROCKING = on_base(coulomb(0.5, 1e9, 8e8), [1.0, 0.5], at=[0.0, 0.279], angle=3.5)
 ROCKING += "settle = false\nstep = 1e-4\n"
+# a block that stands on the end of an equal one, tilted by 25 degrees
+ON_AN_END = f"[laws.j]\n{coulomb(1.5, 1e9, 8e8)}"
+ON_AN_END += block("base", box=[0.8, 1.0], at=[-0.4, -0.5], fixed=True)
+ON_AN_END += block("block", box=[0.8, 1.0], at=[-0.1512, 0.6217], angle=-25.0)
+ON_AN_END += "[run]\nend = 1.0\nsettle = false\nstep = 1e-4\n"
 # a block that flies up from its base: dashpots never pull
 FLYING = on_base(PLAIN, [1.0, 0.5], velocity=[0.0, 0.05]) + "step = 1e-4\ndashpot_normal = 0.3\n"
 # a block that lands on its base without slip, with unequal damping in closure and in shear
@@ -54,10 +59,44 @@ GEOMETRY = (
 )
 
 
+@pytest.mark.parametrize("tilt", [8.0, 22.0, 25.0, 29.0, 40.0])
+def test_area_at_the_end_of_an_edge_follows_its_derivatives(tilt):
+    """Of the upper corner on the lower block and the lower corner on the upper block."""
+    sim = Simulation(parse(ON_AN_END))
+    motion = sim.blocks.motion.copy()
+    outlines = sim.manager.outlines
+    lower, upper = 2, 5  # corners: of the base at the origin; the lowest of the block
+    width = sim.scene.run.soft
+
+    def contacts(motion):
+        return Contacts(outlines, np.array([upper, lower]), np.array([lower, upper - 1]), motion)
+
+    motion[2, 1] -= np.radians(tilt - 25.0)
+    contacts(motion)  # locates the corners
+    corner = outlines.corner_position[upper]
+    motion[:2, 1] += [-0.3 * width - corner.real, -1.2 * width - corner.imag]
+    steps = 1e-7 * np.array([width, width, 1.0])
+    by_difference = np.empty((2, 3))
+    for axis, step in enumerate(steps):
+        change = np.zeros_like(motion)
+        change[axis, 1] = step
+        ahead, behind = contacts(motion + change).area, contacts(motion - change).area
+        by_difference[:, axis] = (ahead - behind) / (2 * step)
+    actual = contacts(motion)
+    largest = 0.1 * 0.8  # m2, at a tilt of up to 20 degrees
+    assert ((actual.area > 0) & (actual.area < (1 + 1e-12) * largest)).all()
+    assert (actual.area == pytest.approx(largest)) == (tilt < 20)
+    scale = largest / width * np.array([1.0, 1.0, width])
+    np.testing.assert_allclose(
+        actual.area_gradient[:, 3:] / scale, by_difference / scale, atol=2e-5
+    )
+
+
 @pytest.mark.parametrize(
     ("name", "steps"),
     [("slope", (1, 40)), ("tilt", (1, 30)), ("stack", (1200, 30)), ("bridges-weathered", (20, 40)),
      ("shear-box", (300, 300)), pytest.param(ROCKING, (5, 200, 200), id="rocking"),
+     pytest.param(ON_AN_END, (1, 100, 300), id="on-an-end"),
      pytest.param(FLYING, (1, 1), id="flying"),
      pytest.param(DAMPED_SHEAR, (2, 5), id="unequal-dashpots")],
 )  # fmt: skip

@@ -23,6 +23,7 @@ import jointlaw as jl
 from dem_demo import cli
 from dem_demo.cli import main as run_blocks
 from dem_demo.contact.joints import tabulate_first_loading
+from dem_demo.output.record import bolt_summary, format_blocks
 from dem_demo.studies import ablate, compare
 from jointlaw.accuracy import slip as slip_tests
 from jointlaw.accuracy import suite, tradeoff
@@ -474,6 +475,30 @@ def test_warning_of_a_closure_range_for_far_larger_stresses(capsys):
     assert f"carry {0.08 * cell_stress:.2g} Pa" in message
     assert f"for {cell_stress:.2g} Pa" in message
     assert f"closure_range = {LAW.closure(0.16 * cell_stress):.2g}" in message
+
+
+def test_listed_blocks_have_their_centroids():
+    listed = [
+        {"block": "a", "x_m": 1.0, "y_m": 2.5, "z_m": -3.0},
+        {"block": "b", "x_m": 4.0, "y_m": 5.0},
+    ]
+    assert format_blocks(listed) == "a (1.00, 2.50, -3.00), b (4.00, 5.00)"
+
+
+def test_forces_of_a_bolt_in_the_summary():
+    """The largest force is before the end."""
+    bolt = SimpleNamespace(ends=[(0.0, 1.0), (2.0, 3.0)], capacity=9e4)
+    frames = [
+        {"tension_N": np.array([tension]), "yielding_m": np.array([yielding])}
+        for tension, yielding in ((1e4, 0.0), (5e4, 1e-3), (2e4, 2e-3))
+    ]
+    run = SimpleNamespace(bolts=frames, scene=SimpleNamespace(bolts=[bolt]))
+    assert bolt_summary(run) == [
+        {
+            "from": [0.0, 1.0], "to": [2.0, 3.0], "capacity_N": 9e4, "force_N": 2e4,
+            "largest_force_N": 5e4, "yielding_m": 2e-3,
+        }
+    ]  # fmt: skip
 
 
 def test_row_of_a_comparison(monkeypatch):

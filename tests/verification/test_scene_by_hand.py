@@ -24,7 +24,9 @@ from by_hand import columns, compare
 from scene_text import block, coulomb, lines
 from scipy.linalg import eigh
 
+from dem_demo import Simulation, parse
 from dem_demo.cli import main
+from dem_demo.output.record import _read_joints
 from dem_demo.output.run import SUMMARY_VERSION
 
 THICKNESS = 1.5  # m
@@ -848,6 +850,18 @@ def test_every_column_of_history(written):
         energies = {f"{k}_J": (v, scene.energy_tolerance) for k, v in scene.energies(t).items()}
         expected = {"time_s": (t, ROUNDING), "energy_error": (scene.energy_error(t), 1e-6)}
         compare(row, expected | energies | scene.monitors(t), f"history.csv at {t:g} s")
+
+
+def test_fractions_of_joints_by_their_names():
+    """They are equal in the scenes above."""
+    sim = Simulation(parse(Stack.text))
+    fractions = {"sliding": 0.25, "slipping": 0.5, "separated": 0.75}
+    for name, value in fractions.items():
+        getattr(sim.joints, name)[:] = value
+    joints = _read_joints(sim)
+    assert {name: {*joints[name]} for name in fractions} == {
+        name: {value} for name, value in fractions.items()
+    }
 
 
 def test_every_column_of_blocks(written):

@@ -20,7 +20,7 @@ from kinds import FITTED
 from scipy.stats import norm
 
 import jointlaw as jl
-from dem_demo import cli
+from dem_demo import SceneError, cli
 from dem_demo.cli import main as run_blocks
 from dem_demo.contact.joints import tabulate_first_loading
 from dem_demo.output.record import bolt_summary, format_blocks
@@ -555,6 +555,16 @@ def test_results_of_an_ablation(tmp_path):
     ]  # fmt: skip
     assert float(written["time_step_s"]) == 1e-4
     assert written["steps"] == "7"
+
+
+def test_row_of_a_variant_that_cannot_be_built():
+    def refuse():
+        raise SceneError("no joints")
+
+    row, run = ablate._run("without joints", refuse, None)
+    assert run is None
+    assert np.isnan([row.pop("time_step_s"), row.pop("cpu_s")]).all()
+    assert row == {"variant": "without joints", "steps": 0, "note": "stopped: no joints"}
 
 
 def test_distance_of_a_variant_is_in_millimetres(monkeypatch):

@@ -32,7 +32,8 @@ LOOSE = np.array([0.5, 0.4, 0.3])
 LOOSE_CENTRE = np.array([9.0, 8.0, 7.0])
 TEXT = (
     lines(title="overhang", gravity=[0.0, 0.0, -G], seismic=SEISMIC, law="other", rough=30.0)
-    + f"[laws.other]\n{coulomb()}[laws.bed]\n{coulomb(0.5, NORMAL, SHEAR)}"
+    + f"[laws.other]\n{coulomb()}[laws.unused]\n{coulomb(0.1)}"
+    + f"[laws.bed]\n{coulomb(0.5, NORMAL, SHEAR)}"
     + block("base", box=BASE, at=BASE_CENTRE, fixed=True)
     + block("slab", box=SLAB, at=SLAB_CENTRE, density=DENSITY, load=LOAD)
     + block("loose", box=LOOSE, at=LOOSE_CENTRE)
@@ -147,7 +148,7 @@ def test_every_field_of_contacts_in_vtk(folder):
     }
     compare(actual, expected, "points of contacts.vtu")
     cells = {name: np.concatenate(parts) for name, parts in mesh.cell_data.items()}
-    expected = {"block_a": ([0], 0), "block_b": ([1], 0), "law": ([1], 0), "area_m2": (AREA, 1e-12)}
+    expected = {"block_a": ([0], 0), "block_b": ([1], 0), "law": ([2], 0), "area_m2": (AREA, 1e-12)}
     compare(cells, expected, "cells of contacts.vtu")
 
 

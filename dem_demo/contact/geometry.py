@@ -41,12 +41,13 @@ class Outlines:
     """Corners and edges of all blocks, c in all; edge i starts at corner i and ends at next[i].
 
     local_corner (c,): corners relative to the centroids (m), complex; local_direction (c,): unit
-    vectors of the edges, complex; both before any rotation. edge_length (c,) in m. block, previous,
-    next (c,): block of each corner, and the corners before and after it. first_corner (blocks +
-    1,): number of the first corner of each block, and c. corner_position, edge_direction (c,): at
-    the present motion, written by the compiled step. corner_length (m): length of joint at a corner
-    that stands on an edge; transition_length (m): distance over which one corner gives way to
-    another. thickness (m): of the blocks.
+    vectors of the edges, complex; both before any rotation. neighbour_direction (c, 2): unit
+    vectors of the edges before and after each edge, relative to it. edge_length (c,) in m. block,
+    previous, next (c,): block of each corner, and the corners before and after it. first_corner
+    (blocks + 1,): number of the first corner of each block, and c. corner_position, edge_direction
+    (c,): at the present motion, written by the compiled step. corner_length (m): length of joint at
+    a corner that stands on an edge; transition_length (m): distance over which one corner gives way
+    to another. thickness (m): of the blocks.
     """
 
     def __init__(
@@ -69,6 +70,9 @@ class Outlines:
         edge = self.local_corner[self.next] - self.local_corner
         self.edge_length = np.abs(edge)
         self.local_direction = edge / self.edge_length
+        neighbours = np.stack([self.previous, self.next], axis=1)
+        reverse = self.local_direction.conj()[:, None]
+        self.neighbour_direction = self.local_direction[neighbours] * reverse
         self.corner_position = np.empty(len(edge), complex)
         self.edge_direction = np.empty(len(edge), complex)
 
@@ -87,8 +91,9 @@ class Outlines:
             transition_length=self.transition_length,
         )
         arrays.bind(
-            self, "local_corner", "local_direction", "edge_length", "block", "previous", "next",
-            "corner_position", "edge_direction", motion=np.ascontiguousarray(motion, float),
+            self, "local_corner", "local_direction", "neighbour_direction", "edge_length", "block",
+            "previous", "next", "corner_position", "edge_direction",
+            motion=np.ascontiguousarray(motion, float),
         )  # fmt: skip
         return arrays
 
@@ -157,6 +162,15 @@ class Contacts(ContactRows):
         pairs = np.empty((len(self.corner), 2), np.int64)
         self.corner_arrays.call("edge_pairs", address(pairs))
         return pairs
+
+    def changed_lengths(self, stored_energy: np.ndarray) -> np.ndarray:
+        """Contacts (m,) that store energy and whose length changed as they went on to other edges.
+
+        stored_energy (k,) in J/m2: of their joints. Of the last update.
+        """
+        arrays = self.corner_arrays
+        n = arrays.call("changed_lengths", address(stored_energy))
+        return arrays.bound_arrays["work_rows"][:n].copy()
 
     def next_codes(self) -> np.ndarray:
         """Codes (k,) of the contacts that come next at the nearer limits of the ranges."""

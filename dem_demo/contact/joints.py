@@ -419,14 +419,11 @@ class Joints:
         old_places = self.place[sources]
         for i in set(law.tolist()):
             has_law = law == i
-            self.by_law[i].copy(old_places[has_law], new_places[has_law])
-        self.first_touch[rows] = self.first_touch[sources]
+            batch = self.by_law[i].pool.batch
+            batch.copy(old_places[has_law], new_places[has_law])
         if changed:
             self._arrange(self.law, self.place)
-        else:
-            self.traction[rows] = self.traction[sources]
-            self.delta[rows] = self.delta[sources]
-            self.measures[:, rows] = self.measures[:, sources]
+        self.step_arrays.call("continue_joints", len(rows), address(rows), address(sources))
         return bool(changed)
 
     def snapshot(self) -> dict[str, np.ndarray]:

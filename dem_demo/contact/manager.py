@@ -50,6 +50,7 @@ MOVED_FRACTION = 0.001  # of its skin: blocks that moved less are left out of a 
 DROP_GAP = 1.5  # skins: gap beyond which a contact is dropped
 CAPACITY = 64  # candidates that there is room for at first
 ANY = -1  # block in a table of laws
+NO_ROWS = np.zeros(0, np.int64)
 
 
 def _in_range(contacts: Contacts, is_known: np.ndarray) -> np.ndarray:
@@ -217,6 +218,8 @@ class ContactManager:
         arrays = self._seams.bound_arrays
         arrays["is_new"][:] = False if is_new is None else is_new
         n = self._seams.call("find_neighbours")
+        if n == 0:
+            return NO_ROWS, NO_ROWS
         rows = arrays["rows"][:n].copy()
         self.face_pairs[rows] = arrays["edges"][:n]
         return rows, arrays["sources"][:n].copy()

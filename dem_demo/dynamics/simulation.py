@@ -37,7 +37,6 @@ from .search import vector_length
 from .timestep import MAX_FRACTION_OF_LIMIT, TimeStepLimit, impact_limit
 
 WIDE_MARGIN = 0.4  # fraction of the limit: a step below it stays stable as lever arms change
-LENGTH_TOLERANCE = 1e-6  # relative: lengths that differ by rounding only
 TINY = 1e-300  # lower bound of a denominator
 NO_ROWS = np.zeros(0, np.int64)
 CHECK_INTERVAL = 16  # steps between two checks of drives and of excavation stages
@@ -616,17 +615,13 @@ class Simulation:
         manager = self.manager
         joints = self.joints
         thickness = self.scene.thickness
-        length = self.contacts.length
-        old_length = self.contacts.previous_length
-        changed = np.flatnonzero(length != old_length)
-        old_energy = joints.stored_energy[changed] * old_length[changed]  # J/m
-        ratio = length[changed] / np.maximum(old_length[changed], TINY)
-        has_changed = (np.abs(ratio - 1) > LENGTH_TOLERANCE) & (old_energy > 0)
-        changed = changed[has_changed]
+        changed = self.contacts.changed_lengths(joints.stored_energy)
         if not len(changed):
             return changed
-        old_energy = old_energy[has_changed]
-        is_longer = ratio[has_changed] > 1
+        length = self.contacts.length
+        old_length = self.contacts.previous_length[changed]
+        old_energy = joints.stored_energy[changed] * old_length  # J/m
+        is_longer = length[changed] > old_length
         new_energy = joints.stored_energy[changed]  # J/m2
         balance.booked_area[changed] = self.contacts.area[changed]
         restarted = changed[is_longer]

@@ -222,6 +222,26 @@ EXPORT void dem_read_joints_of(dem_step *sim, long long m, const long long *poin
   }
 }
 
+/* Let contacts (m,) have the results of the law and the first touch of the contacts `sources` (m,),
+ * whose joints they continue with the same law */
+EXPORT void dem_continue_joints(dem_step *sim, long long m, const long long *points,
+                                const long long *sources)
+{
+  const long long dim = sim->dim, n_measures = DEM_MEASURES + dim;
+  for (long long j = 0; j < m; j++) {
+    const long long i = points[j], source = sources[j];
+    const dem_law_joints *law = sim->laws + sim->law[source];
+    const long long to = sim->place[i], from = sim->place[source];
+    for (long long c = 0; c < dim; c++) {
+      law->F[dim * to + c] = law->F[dim * from + c];
+      sim->first_touch[dim * i + c] = sim->first_touch[dim * source + c];
+    }
+    for (long long c = 0; c < n_measures; c++)
+      law->measures[n_measures * to + c] = law->measures[n_measures * from + c];
+  }
+  dem_read_joints_of(sim, m, points);
+}
+
 /* Upper bound of the stiffness (Pa/m) of contact i at its normal stress, by linear interpolation on
  * the first-loading curve */
 static double stiffness_bound(const dem_step *sim, long long i)

@@ -153,7 +153,7 @@ static void locate_contact(const dem_corners *plane, long long i)
   const dem_vector local =
       components(subtract(position, plane->corner_position[edge]), direction);
   const long long sides[2] = {plane->previous[corner], corner};
-  const long long neighbours[2] = {plane->previous[edge], plane->next[edge]};
+  const dem_vector *neighbours = plane->neighbour_direction + 2 * edge;
   const dem_vector to_end[2] = {vector(edge_length - local.x, -local.y),
                                 vector(-local.x, -local.y)};
   dem_vector side[2], bisector[2], mean[2], remaining[2], gradient[2];
@@ -212,8 +212,7 @@ static void locate_contact(const dem_corners *plane, long long i)
      * comes next, and the limit is where both are equally deep. Where a side is raised, its corner
      * comes next. Joints are drawn parallel but for rounding, which must not decide: within
      * DEM_PARALLEL_SINE they count as parallel. */
-    const dem_vector beyond = scale(ahead[s], components(plane->local_direction[neighbours[s]],
-                                                         plane->local_direction[edge]));
+    const dem_vector beyond = scale(ahead[s], neighbours[s]);
     const int corner_next = ahead[s] * cross(side[s], beyond) <= DEM_PARALLEL_SINE ||
                             rise[1 - s] < -DEM_PARALLEL_SINE;
     const dem_vector toward = corner_next ? bisector[s] : vector(ahead[s] + beyond.x, beyond.y);
@@ -328,6 +327,19 @@ EXPORT long long dem_update_contacts(void *corners, long long begin, long long e
     n_rows = n_remaining;
   }
   return n_transferred;
+}
+
+/* Contacts that store energy (stored_energy (k,) in J/m2) and whose length has changed as they went on
+ * to other edges in the last update. Writes them to plane->work_rows; returns their number. */
+EXPORT long long dem_changed_lengths(dem_corners *plane, const double *stored_energy)
+{
+  long long n_rows = 0;
+  for (long long i = 0; i < plane->n_contacts; i++) {
+    const double before = plane->previous_length[i], change = fabs(plane->length[i] - before);
+    if (change > DEM_LENGTH_TOLERANCE * before && stored_energy[i] * before > 0.0)
+      plane->work_rows[n_rows++] = i;
+  }
+  return n_rows;
 }
 
 /* Height (m) of a corner above the line of an edge */

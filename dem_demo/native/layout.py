@@ -58,6 +58,7 @@ CONSTANTS = {
     "CROSSING_SINE": Constant(1e-3, "sine between two edges that cross"),
     "CROSSING_ERROR": Constant(1e-9, "of the length of an edge: rounding of a distance of blocks"),
     "MAX_SEAM_STEP": Constant(0.05, "of the skin: step between coplanar edges at a seam"),
+    "LENGTH_TOLERANCE": Constant(1e-6, "relative: lengths that differ by rounding only"),
     "RANGE_TOLERANCE": Constant(1e-10, "m by which a corner may leave its range: no chatter"),
     "BLOCKS_PER_PART": Constant(BLOCKS_PER_PART, "of a phase of a step"),
     "POINTS_PER_PART": Constant(POINTS_PER_PART, "of a phase of a step"),
@@ -80,8 +81,8 @@ class Field(NamedTuple):
 
 LAW_JOINTS = {
     "d": Field("double *", "(places, dim): increments of the next step of the law, m"),
-    "F": Field("const double *", "(places, dim): tractions after it, Pa"),
-    "measures": Field("const double *", "(places, DEM_MEASURES + dim): measures; displacement, m"),
+    "F": Field("double *", "(places, dim): tractions after it, Pa"),
+    "measures": Field("double *", "(places, DEM_MEASURES + dim): measures; displacement, m"),
     "stress": Field("const double *", "(points,): normal stress of the first-loading curve, Pa"),
     "stiffness": Field("const double *", "(points,): upper bound of the stiffness there, Pa/m"),
     "points": Field("long long", "of the first-loading curve"),
@@ -134,7 +135,7 @@ STEP = {
     "laws": Field("const dem_law_joints *", "one for each law"),
     "law": Field("const long long *", "(k,): number of the law"),
     "place": Field("const long long *", "(k,): place among the joints of that law"),
-    "first_touch": Field("const double *", "(k, dim): displacement of the law at first touch, m"),
+    "first_touch": Field("double *", "(k, dim): displacement of the law at first touch, m"),
     "reduction": Field("const double *", "(dim,): 1, and the factor of a strength reduction"),
     "traction": Field("double *", "(k, dim): normal, shears; Pa"),
     "delta": Field("double *", "(k, dim): closure and sliding since first touch, m"),
@@ -173,6 +174,7 @@ CORNERS = {
     # ------------------------------------------------------------------ corners; edge i starts at i
     "local_corner": Field("const dem_vector *", "(c,): from the centroid, block not rotated"),
     "local_direction": Field("const dem_vector *", "(c,): of the edge, block not rotated"),
+    "neighbour_direction": Field("const dem_vector *", "(c, 2): edges before, after, in its frame"),
     "edge_length": Field("const double *", "(c,): m"),
     "block": Field("const long long *", "(c,): block of the corner"),
     "previous": Field("const long long *", "(c,): corner before it"),

@@ -27,7 +27,7 @@ from dem_demo.output.record import bolt_summary, format_blocks
 from dem_demo.studies import ablate, compare
 from jointlaw.accuracy import slip as slip_tests
 from jointlaw.accuracy import suite, tradeoff
-from jointlaw.calibration import datasets, field, noise
+from jointlaw.calibration import comparison, datasets, field, noise
 from jointlaw.calibration.aperture import FlowConditions, FlowFit, FlowTest, read_flow
 from jointlaw.calibration.fit import Fit
 from jointlaw.calibration.meaning import describe
@@ -321,6 +321,25 @@ def test_table_of_peaks_and_interval_of_the_opening():
         opening,
     ).groups()
     assert [*map(float, numbers)] == pytest.approx([0.1, 0.5, 3.0, 12.0])
+
+
+def test_columns_of_points_beside_the_law():
+    """Each column has a value of its own."""
+    one = comparison.Comparison(
+        "a", "shear stress", True, displacement=np.array([1e-3]), normal=np.array([2e6]),
+        measured=np.array([3e6]), law=np.array([4e6]), band=np.array([[5e6], [6e6]]),
+        specimen_band=np.array([[0.0], [9e6]]), residual=np.array([0.07]), scale=np.array([8e6]),
+        sigma=np.array([0.01]),
+    )  # fmt: skip
+    (row,) = csv.DictReader(comparison.to_csv([one]).splitlines())
+    texts = {"test": "a", "use": "fitted", "quantity": "shear stress", "unit": "MPa"}
+    assert {name: row.pop(name) for name in texts} == texts
+    assert {name: float(text) for name, text in row.items()} == pytest.approx(
+        {
+            "displacement_mm": 1.0, "normal_stress_MPa": 2.0, "measured": 3.0, "law": 4.0,
+            "low": 5.0, "high": 6.0, "residual_percent": 7.0,
+        }
+    )  # fmt: skip
 
 
 def test_notes_and_messages_of_shear_files():

@@ -250,7 +250,12 @@ def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
     assert len(rows) == 2
     summary = summary_of(tmp_path / "o")
     assert summary["version"] == 2
-    assert summary["parameters_SI"] == pytest.approx(jl.from_surface(z, 20e-6).parameters)
+    fit = jl.from_surface(z, 20e-6)
+    errors = {name: estimate.standard_error for name, estimate in fit.estimates.items()}
+    assert summary["parameters_SI"] == pytest.approx(fit.parameters)
+    assert summary["standard_error_SI"] == pytest.approx(errors)
+    assert summary["sampling_length_m"] == pytest.approx(fit.asperities.size)
+    assert summary["not_identifiable"] == fit.not_identifiable
     shear = "shear o/surface.toml --normal-stress 1MPa --to 80um --steps 100 --out p"
     assert main(shear.split()) == 2
     assert "add the table [asperity] with K" in capsys.readouterr().err

@@ -193,6 +193,39 @@ def test_alignment_of_two_faces():
     assert "correlation of the faces is 0.900" in text
 
 
+def test_summary_of_the_scans_of_two_faces(monkeypatch):
+    faces = CompositeSurface(np.zeros((2, 2)), "rows", (2e-3, -3e-3), math.radians(1.5), 0.9)
+    fit = SimpleNamespace(
+        parameters={"a": 3.0}, estimates={"a": SimpleNamespace(standard_error=0.2)},
+        asperities=SimpleNamespace(size=4e-4), not_identifiable={"b": "no reason"},
+        report=lambda: "", plot=None,
+    )  # fmt: skip
+    known = {
+        "read_scan": np.zeros((2, 2)), "join_faces": faces, "from_surface": fit,
+        "require_rock": None, "_report_friction": "", "_surface_toml": "", "_origin": {},
+        "_warnings": [], "new_about": About(),
+    }  # fmt: skip
+    for name, result in known.items():
+        monkeypatch.setattr(scan, name, lambda *_, result=result: result)
+    written = []
+    monkeypatch.setattr(scan, "write_results", lambda *arguments: written.append(arguments[2]))
+    options = SimpleNamespace(
+        file="lower.npy", upper="upper.npy", height_unit="um", spacing=1e-4, decimal=None,
+        mirror=None, sampling_length=None,
+    )  # fmt: skip
+    scan._run(options)
+    assert written == [
+        {
+            "parameters_SI": {"a": 3.0}, "standard_error_SI": {"a": 0.2},
+            "sampling_length_m": 4e-4, "not_identifiable": {"b": "no reason"}, "warnings": (),
+            "faces": {
+                "mirror": "rows", "shift_m": (2e-3, -3e-3), "rotation_rad": math.radians(1.5),
+                "correlation": 0.9,
+            },
+        }
+    ]  # fmt: skip
+
+
 def test_report_of_a_scan(monkeypatch):
     lengths = []
 

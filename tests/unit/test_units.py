@@ -10,10 +10,14 @@ import pytest
 from output_faults import ROOT
 from scipy import constants
 
+import jointlaw as jl
 from dem_demo.scene import drives
 from jointlaw.calibration import comparison, tables
 from jointlaw.laboratory import record
+from jointlaw.parameters.declared import parameters_of
 from jointlaw.support import units
+from jointlaw.surface import fit as surface
+from jointlaw.surface.densities import HEIGHT_PARAMETERS
 
 PREFIXES = {
     "n": constants.nano, "u": constants.micro, "µ": constants.micro, "μ": constants.micro,
@@ -156,3 +160,10 @@ def test_units_of_the_columns_of_a_laboratory_test():
         **dict.fromkeys(("stored", "dissipated"), "J/m2"),
     }
     assert [*record.UNITS.items()] == [*expected.items()]
+
+
+def test_units_of_the_parameters_of_a_scan():
+    """The report of a scan has the units that the parameters declare."""
+    declared = parameters_of(jl.GammaHeights) | parameters_of(jl.JointLaw)
+    assert {name: declared[name].unit for name in surface.UNITS} == surface.UNITS
+    assert surface.UNITS.keys() >= {name for name in HEIGHT_PARAMETERS if declared[name].unit}

@@ -55,7 +55,7 @@ IDLE_SHARE = 1e-6  # of it: the stress of faces drawn on each other, which touch
 IDLE_AREA = 1e-9  # m2: of a corner that touches the end of an edge
 MAX_HALVINGS = 8  # of a time step that was chosen automatically
 FILE = "state.npz"
-VERSION = 14
+VERSION = 15
 UPDATED_IN_PLACE = (  # arrays of the state that the compiled step, or views of them, refer to
     "blocks.motion",
     "blocks.velocity",

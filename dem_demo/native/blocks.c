@@ -539,7 +539,7 @@ INLINE void run_part(dem_step *sim, double dt, long long phase, long long part, 
   switch (phase) {
   case DEM_MOVE: move_blocks(sim, dt, begin, end, dim, dof); break;
   case DEM_UPDATE:
-    if (sim->has_parts) sim->update_geometry(sim->geometry, begin, end);
+    if (sim->has_parts && sim->update_geometry(sim->geometry, begin, end)) raise_to(&sim->rebuild, 1);
     set_increments(sim, dt, begin, end, dim, dof);
     break;
   case DEM_FINISH_POINTS: finish_points(sim, part, dim); break;

@@ -14,16 +14,23 @@
  * neighbours, by less than `tie` are no points: with them the number of points would change with the
  * rounding of flush faces.
  *
- * Two blocks without such faces touch along an edge, at a corner, or where two edges cross. They are
- * in contact in the direction in which they overlap least, among the normals of their faces and the
- * products of their edges (separating axes). If it is the normal of a face of one block, the other
- * block stands on this face with an edge or a corner: its face next to the deepest vertex is clipped,
- * and of the polygon only the strip next to its lowest corner counts, `strip` wide from a tilt of
- * 5 degrees on, wider for smaller tilts, and the whole polygon up to 2 degrees. The upper corners of a
- * strip are open, so the areas count twice there. If it is the product of two edges, the point where
- * they cross is the contact. Blocks that meet in a vertex of both, or along two edges at a large tilt, have
- * no joint there: areas fade within `fade` of the border of a face, and of the ends of edges that cross. As the directions of the law belong to the face that is stood on, the
- * plane of a contact may be the one of a or of b (`plane_is_of_a`).
+ * Two blocks without such faces touch along an edge, at a corner, or where two edges cross. On the plane
+ * of a face of one block the other one stands with an edge or a corner: its face next to the lowest
+ * vertex is clipped, and of the polygon only the strip next to its lowest corner counts, `strip` wide
+ * from a tilt of 5 degrees on, wider for smaller tilts, and the whole polygon up to 2 degrees. The upper
+ * corners of a strip are open, so the areas count twice there. As the directions of the law belong to
+ * the face that is stood on, the plane of a contact may be the one of a or of b (`plane_is_of_a`).
+ *
+ * Which contact two blocks have changes as they move: the plane of a or of b, or a crossing of edges. The
+ * energy of a contact is the sum of area times energy per area, so the balance of energy is kept only if
+ * areas and closures are continuous functions of the places of the blocks, whose derivatives are forces.
+ *   - Planes over which the other block lies least deep (separating axes), within `fade`, share the
+ *     contact; the crossing of edges takes the area that a polygon has lost near the border of its face.
+ *   - Nothing depends on whether a corner lies on a line: a clipped polygon has any number of corners
+ *     there. So extreme places are means along the border of the polygon, and corners next to a line give
+ *     their area to their neighbours.
+ *   - The derivatives of areas and closures are differences: block b is moved by a small step, and the
+ *     same contact is measured again.
  *
  * Nothing here allocates memory or knows a law. Vectors are three doubles.
  */
@@ -36,6 +43,7 @@
 enum {
   MAX_CORNERS = 128, /* of two faces together */
   MAX_FACE_PAIRS = 64, /* in contact, of two blocks */
+  MAX_PLANES = 4,    /* that share a contact along an edge or at a corner */
   TOO_MANY_CORNERS = -1
 };
 
@@ -61,27 +69,32 @@ static void subtract(const double *a, const double *b, double *out)
   for (int j = 0; j < 3; j++) out[j] = a[j] - b[j];
 }
 
+/* Vertices and normals of a block at its present place */
+static void place_block(const dem_solids *s, long long i)
+{
+  const double *rotation = s->rotation + 9 * i, *position = s->position + 3 * i;
+  for (long long v = s->first_vertex[i]; v < s->first_vertex[i + 1]; v++)
+    for (int j = 0; j < 3; j++)
+      s->vertex[3 * v + j] = position[j] + dot(rotation + 3 * j, s->local_vertex + 3 * v);
+  for (long long f = s->first_face[i]; f < s->first_face[i + 1]; f++)
+    for (int j = 0; j < 3; j++)
+      s->normal[3 * f + j] = dot(rotation + 3 * j, s->local_normal + 3 * f);
+}
+
 /* Vertices, normals and bounding boxes of all blocks at their present places */
 EXPORT void dem_place_solids(const dem_solids *s)
 {
   for (long long i = 0; i < s->n_blocks; i++) {
-    const double *rotation = s->rotation + 9 * i, *position = s->position + 3 * i;
     double *low = s->box + 6 * i, *high = low + 3;
+    place_block(s, i);
     for (int j = 0; j < 3; j++) {
       low[j] = HUGE_VAL;
       high[j] = -HUGE_VAL;
-    }
-    for (long long v = s->first_vertex[i]; v < s->first_vertex[i + 1]; v++) {
-      for (int j = 0; j < 3; j++) {
-        const double x = position[j] + dot(rotation + 3 * j, s->local_vertex + 3 * v);
-        s->vertex[3 * v + j] = x;
-        if (x < low[j]) low[j] = x;
-        if (x > high[j]) high[j] = x;
+      for (long long v = s->first_vertex[i]; v < s->first_vertex[i + 1]; v++) {
+        low[j] = fmin(low[j], s->vertex[3 * v + j]);
+        high[j] = fmax(high[j], s->vertex[3 * v + j]);
       }
     }
-    for (long long f = s->first_face[i]; f < s->first_face[i + 1]; f++)
-      for (int j = 0; j < 3; j++)
-        s->normal[3 * f + j] = dot(rotation + 3 * j, s->local_normal + 3 * f);
   }
 }
 
@@ -249,36 +262,39 @@ static double triangle_area(const double *a, const double *b, const double *c)
   return 0.5 * fabs((a[0] - c[0]) * (b[1] - c[1]) - (a[1] - c[1]) * (b[0] - c[0]));
 }
 
-/* Mean place along a direction of the corners of a polygon that lie within about a length from the
- * farthest one; of the nearest one if the length is negative. Unlike the largest place it is smooth where
- * an edge becomes normal to the direction. */
+/* Mean place along a direction of the border of a polygon, weighted by exp(-distance / length) with the
+ * distance along the direction from its farthest corner; from its nearest one if the length is negative.
+ * Unlike the farthest place it is smooth where a side becomes normal to the direction, and a further
+ * corner on a side does not change it. */
 static double extreme(double (*polygon)[2], int m, const double *direction, double length)
 {
   double farthest = -HUGE_VAL, sum = 0.0, weights = 0.0;
-  for (int i = 0; i < m; i++) {
-    const double along = dot_2(direction, polygon[i]) / length;
-    if (along > farthest) farthest = along;
+  for (int i = 0; i < m; i++) farthest = fmax(farthest, dot_2(direction, polygon[i]) / length);
+  for (int i = 0; i < m; i++) { /* integrals over the side to the next corner */
+    const double *here = polygon[i], *next = polygon[(i + 1) % m];
+    const double p = farthest - dot_2(direction, here) / length;
+    const double q = farthest - dot_2(direction, next) / length;
+    const double half = 0.5 * (q - p), middle = 0.5 * (p + q);
+    const double mean_of_ends = 0.5 * (exp(-p) + exp(-q));
+    const int is_level = fabs(half) < 1e-3; /* a series, whose next terms are below 1e-12 */
+    const double weight = is_level ? exp(-middle) * (1.0 + half * half / 6.0)
+                                   : 0.5 * (exp(-p) - exp(-q)) / half;
+    const double excess =
+        is_level ? exp(-middle) * half * half / 3.0 : mean_of_ends - weight;
+    const double size = hypot(next[0] - here[0], next[1] - here[1]);
+    weights += size * weight;
+    sum += size * (middle * weight - excess);
   }
-  for (int i = 0; i < m; i++) {
-    const double along = dot_2(direction, polygon[i]) / length;
-    const double weight = exp(along - farthest);
-    sum += weight * along;
-    weights += weight;
-  }
-  return length * sum / weights;
+  return length * (farthest - sum / weights);
 }
 
 /* Keep the strip of a polygon next to its lowest corner. gradient (2,): slope of the height along both
- * axes; sine: of the tilt; width (m): of the strip from 5 degrees on, the whole polygon up to 2.
- * Returns the corners; `weight` is the factor of their areas. */
-static int keep_strip(double (*polygon)[2], int m, const double *gradient, double sine, double width,
+ * axes; part: 0 at a tilt up to 2 degrees, where the whole polygon counts, and 1 from 5 degrees on, where
+ * the strip has its `width` (m). Returns the corners; `weight` is the factor of their areas. */
+static int keep_strip(double (*polygon)[2], int m, const double *gradient, double part, double width,
                       double *weight)
 {
   const double slope = hypot(gradient[0], gradient[1]);
-  const double share = (sine - DEM_FLUSH_SINE) / (DEM_STRIP_SINE - DEM_FLUSH_SINE);
-  const double part = share > 1.0 ? 1.0 : share;
-  *weight = 1.0;
-  if (!(part > 0.0)) return m;
   const double up[2] = {gradient[0] / slope, gradient[1] / slope};
   const double lowest = extreme(polygon, m, up, -0.25 * width);
   const double highest = extreme(polygon, m, up, 0.25 * width);
@@ -296,61 +312,102 @@ static double falling_ramp(double x, double low, double high)
   return fmin(fmax((high - x) / (high - low), 0.0), 1.0);
 }
 
-/* Sine of the smaller angle between a contour line of the height over the plane and one of both edges
- * of a polygon at its lowest corner */
-static double contour_sine(double (*polygon)[2], int m, const double *gradient)
+/* Distance of a point from the border of a face with corners `edges`, over `fade`, from 0 to 1 */
+static double depth_inside(double (*edges)[2], int m_edges, double x, double y, double fade)
 {
+  double distance = fade;
+  for (int i = 0; i < m_edges; i++) {
+    const double *start = edges[i], *end = edges[(i + 1) % m_edges];
+    const double u = end[0] - start[0], v = end[1] - start[1];
+    distance = fmin(distance, (u * (y - start[1]) - v * (x - start[0])) / hypot(u, v));
+  }
+  return fmax(distance / fade, 0.0);
+}
+
+/* Share of its area that a contact along an edge or at a corner keeps near the border of the face that
+ * it lies on; a crossing of edges takes the rest. part: 0 at a tilt up to 2 degrees, 1 from 5 on.
+ *
+ * A corner: its distance from the border over `fade`, at most 1. An edge, which is a side of the polygon
+ * next to its lowest corner along a contour line of the height: the largest of these distances of both
+ * ends and the middle. An edge along the border, as one of two equal blocks rocks on the other, keeps its
+ * area up to a tilt of DEM_WHOLE_EDGE_SINE, as the planes of both have almost one direction; from
+ * DEM_NO_EDGE_SINE on its area fades like the area of a corner. */
+static double share_inside(double (*polygon)[2], int m, double (*edges)[2], int m_edges,
+                           const double *gradient, double sine, double part, double fade)
+{
+  const double slope = hypot(gradient[0], gradient[1]);
+  const double at_border = falling_ramp(sine, DEM_WHOLE_EDGE_SINE, DEM_NO_EDGE_SINE);
   int lowest = 0;
   for (int i = 1; i < m; i++)
     if (dot_2(gradient, polygon[i]) < dot_2(gradient, polygon[lowest])) lowest = i;
-  double smallest = 1.0;
-  for (int k = 1; k < m; k += m - 2) { /* the next corner, and the one before */
-    const double *here = polygon[lowest], *other = polygon[(lowest + k) % m];
-    const double edge[2] = {other[0] - here[0], other[1] - here[1]};
-    const double sine = dot_2(gradient, edge) / (hypot(gradient[0], gradient[1]) * hypot(edge[0], edge[1]));
-    smallest = fmin(smallest, fabs(sine));
+  const double height = dot_2(gradient, polygon[lowest]);
+  const double of_corner =
+      depth_inside(edges, m_edges, polygon[lowest][0], polygon[lowest][1], fade);
+  double largest = of_corner;
+  for (int i = 0; i < m; i++) {
+    const double *here = polygon[i], *other = polygon[(i + 1) % m];
+    const double side[2] = {other[0] - here[0], other[1] - here[1]};
+    const double length = hypot(side[0], side[1]), rise = dot_2(gradient, side);
+    const double above = dot_2(gradient, here) + fmin(rise, 0.0) - height;
+    const double near = 1.0 - above / (slope * fade);
+    if (!(near > 0.0 && length > 0.0)) continue;
+    const double level =
+        near * fmin(length / fade, 1.0) *
+        falling_ramp(fabs(rise) / (slope * length), DEM_EDGE_SINE, DEM_CORNER_SINE);
+    double inside = of_corner;
+    for (int k = 0; k < 3; k++)
+      inside = fmax(inside, depth_inside(edges, m_edges, here[0] + 0.5 * k * side[0],
+                                         here[1] + 0.5 * k * side[1], fade));
+    const double of_edge = inside + (1.0 - inside) * at_border;
+    largest = fmax(largest, of_corner + level * (of_edge - of_corner));
   }
-  return smallest;
+  return 1.0 - part * (1.0 - largest);
 }
 
-/* Share of its area that a contact along an edge keeps near the border of the face that it lies on:
- * the distance from the border, over `fade`, of the lowest line of the polygon, and at most 1.
- *
- * An edge along the border, as one of two equal blocks rocks on the other, keeps its area up to a tilt of
- * DEM_WHOLE_EDGE_SINE: its contact passes between the planes of both, whose directions hardly differ.
- * From DEM_NO_EDGE_SINE on its area fades like the area of a corner. */
-static double share_inside(double (*polygon)[2], int m, double (*edges)[2], int m_edges,
-                           const double *gradient, double sine, double tie, double fade)
+/* Distance of corner i of a polygon outwards from the line between its neighbours; `along`: the part of the way
+ * from the one before to the one after it at which the corner lies */
+static double distance_from_line(double (*polygon)[2], int m, int i, double *along)
 {
-  double lowest = HUGE_VAL, farthest = 0.0, ends[2][2] = {{0.0}};
-  for (int i = 0; i < m; i++) {
-    const double height = gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
-    if (height < lowest) lowest = height;
-  }
-  int count = 0;
-  for (int i = 0; i < m; i++) {
-    const double height = gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
-    if (height > lowest + tie || count > 1) continue;
-    memcpy(ends[count++], polygon[i], sizeof ends[0]);
-  }
-  if (count == 1) memcpy(ends[1], ends[0], sizeof ends[0]);
-  for (int k = 0; k < 3; k++) { /* both ends of the lowest line and its middle */
-    double distance = HUGE_VAL;
-    const double x = 0.5 * (ends[k != 0][0] + ends[k == 2][0]);
-    const double y = 0.5 * (ends[k != 0][1] + ends[k == 2][1]);
-    for (int i = 0; i < m_edges; i++) {
-      const double *start = edges[i], *end = edges[(i + 1) % m_edges];
-      const double u = end[0] - start[0], v = end[1] - start[1];
-      const double inside = (u * (y - start[1]) - v * (x - start[0])) / hypot(u, v);
-      if (inside < distance) distance = inside;
+  const double *start = polygon[(i + m - 1) % m], *end = polygon[(i + 1) % m];
+  const double x = end[0] - start[0], y = end[1] - start[1], length = hypot(x, y);
+  const double u = polygon[i][0] - start[0], v = polygon[i][1] - start[1];
+  *along = length > 0.0 ? fmin(fmax((x * u + y * v) / (length * length), 0.0), 1.0) : 0.0;
+  return length > 0.0 ? (y * u - x * v) / length : hypot(u, v);
+}
+
+/* Move the areas of corners that hardly differ from the line between their neighbours to these: all of it
+ * up to `merge` from the line, where the corner is removed, and none from twice this distance on. Areas
+ * and their first moments along the line stay. Without this the corner where two almost parallel edges
+ * cross would move along them, and take area with it, at almost no motion of the blocks. */
+static int merge_corners(double (*polygon)[2], int m, double *area, double merge)
+{
+  double along, change[MAX_CORNERS] = {0.0};
+  while (m > 3) { /* the corner next to its line first: beside it a corner seems to lie on a line */
+    double nearest = HUGE_VAL;
+    int i = 0;
+    for (int k = 0; k < m; k++) {
+      const double distance = distance_from_line(polygon, m, k, &along);
+      if (!(distance < nearest)) continue;
+      nearest = distance;
+      i = k;
     }
-    if (distance > farthest) farthest = distance;
+    if (!(nearest <= merge)) break;
+    distance_from_line(polygon, m, i, &along);
+    area[(i + m - 1) % m] += (1.0 - along) * area[i];
+    area[(i + 1) % m] += along * area[i];
+    memmove(polygon + i, polygon + i + 1, sizeof polygon[0] * (size_t) (m - 1 - i));
+    memmove(area + i, area + i + 1, sizeof area[0] * (size_t) (m - 1 - i));
+    m--;
   }
-  const double share = farthest < fade ? farthest / fade : 1.0;
-  const double part =
-      falling_ramp(sine, DEM_WHOLE_EDGE_SINE, DEM_NO_EDGE_SINE) *
-      falling_ramp(contour_sine(polygon, m, gradient), DEM_EDGE_SINE, DEM_CORNER_SINE);
-  return share + (1.0 - share) * part;
+  for (int i = 0; i < m && m > 3; i++) {
+    const double far = fmin(fmax(distance_from_line(polygon, m, i, &along) / merge - 1.0, 0.0), 1.0);
+    const double moved = area[i] * (1.0 - far * far * (3.0 - 2.0 * far));
+    change[i] -= moved;
+    change[(i + m - 1) % m] += (1.0 - along) * moved;
+    change[(i + 1) % m] += along * moved;
+  }
+  for (int i = 0; i < m; i++) area[i] += change[i];
+  return m;
 }
 
 /* A face over the plane of another one, along two axes of this plane and its normal */
@@ -365,6 +422,7 @@ typedef struct {
   double polygon[MAX_CORNERS][2], area[MAX_CORNERS]; /* corners, and the areas that they carry */
   double height, gradient[2];                        /* of the face over the plane */
   double lowest;                                     /* height over the plane */
+  double share;                                      /* see share_inside */
   int m;
 } overlap;
 
@@ -372,17 +430,19 @@ typedef struct {
 static void find_overlap(const raised_face *face, double (*edges)[2], int m_edges, double tie,
                          double strip, double fade, overlap *out)
 {
-  double (*polygon)[2] = out->polygon, centroid[2], weight = 1.0, share = 1.0;
+  double (*polygon)[2] = out->polygon, centroid[2], weight = 1.0;
   const double *normal = face->normal;
   int m = face->m;
   for (int i = 0; i < m; i++) memcpy(polygon[i], face->corner[i], sizeof polygon[0]);
   for (int i = 0; i < m_edges && m > 2; i++)
     m = clip(polygon, m, edges[i], edges[(i + 1) % m_edges]);
-  m = without_ties(polygon, m, tie);
+  const double *gradient = out->gradient, sine = hypot(normal[0], normal[1]);
+  const int is_flush = !(sine > DEM_FLUSH_SINE);
+  if (is_flush) m = without_ties(polygon, m, tie);
   out->m = 0;
   out->lowest = HUGE_VAL;
+  out->share = 0.0;
   if (m < 3) return;
-  const double *gradient = out->gradient, sine = hypot(normal[0], normal[1]);
   out->gradient[0] = -normal[0] / normal[2];
   out->gradient[1] = -normal[1] / normal[2];
   out->height = dot(normal, face->corner[0]) / normal[2];
@@ -390,62 +450,30 @@ static void find_overlap(const raised_face *face, double (*edges)[2], int m_edge
     const double here = out->height + gradient[0] * polygon[i][0] + gradient[1] * polygon[i][1];
     if (here < out->lowest) out->lowest = here;
   }
-  if (sine > DEM_FLUSH_SINE) {
-    share = share_inside(polygon, m, edges, m_edges, gradient, sine, tie, fade);
-    m = keep_strip(polygon, m, gradient, sine, strip, &weight);
-    m = without_ties(polygon, m, tie);
+  out->share = 1.0;
+  if (!is_flush) {
+    const double part = fmin((sine - DEM_FLUSH_SINE) / (DEM_STRIP_SINE - DEM_FLUSH_SINE), 1.0);
+    out->share = share_inside(polygon, m, edges, m_edges, gradient, sine, part, fade);
+    m = keep_strip(polygon, m, gradient, part, strip, &weight);
   }
-  if (m < 3 || !(share * polygon_area(polygon, m, centroid) > tie * tie)) return;
+  if (m < 3 || !(out->share * polygon_area(polygon, m, centroid) > tie * tie)) return;
   for (int i = 0; i < m; i++)
-    out->area[i] = 0.5 * share * weight *
+    out->area[i] = 0.5 * out->share * weight *
                    (triangle_area(polygon[(i + m - 1) % m], polygon[i], centroid) +
                     triangle_area(polygon[i], polygon[(i + 1) % m], centroid));
-  out->m = m;
+  out->m = is_flush ? m : merge_corners(polygon, m, out->area, DEM_MERGE_PER_FADE * fade);
 }
 
-/* Move a face by a small motion: along an axis (0 to 2), or about it (3 to 5) through the origin */
-static void move_face(raised_face *face, int motion, double step)
+/* Write point `number` of a contact, if there is room for it. first: place of the first point of the
+ * contact; face_a, face_b: faces of the blocks; normal: outward of the block whose plane it is; base: a
+ * point of this plane */
+static void write_point(const dem_points *out, long long first, int number, long long face_a,
+                        long long face_b, int plane_is_of_a, const double *point,
+                        const double *normal, const double *base, double area)
 {
-  const int axis = motion % 3, next = (axis + 1) % 3, last = (axis + 2) % 3;
-  const double cosine = cos(step), sine = sin(step);
-  for (int i = -1; i < face->m; i++) {
-    double *at = i < 0 ? face->normal : face->corner[i];
-    if (motion < 3) {
-      if (i >= 0) at[axis] += step;
-      continue;
-    }
-    const double u = at[next], v = at[last];
-    at[next] = cosine * u - sine * v;
-    at[last] = sine * u + cosine * v;
-  }
-}
-
-/* Derivatives (m, 6) of the areas of an overlap by displacements of the face along three axes, and by
- * rotations about them through the origin: by differences, zero where the number of corners changes */
-static void find_area_rates(const raised_face *face, double (*edges)[2], int m_edges, double tie,
-                            double strip, double fade, int m, double (*rate)[6])
-{
-  for (int motion = 0; motion < 6; motion++) {
-    const double step = DEM_DIFFERENCE * (motion < 3 ? strip : 1.0);
-    overlap moved[2];
-    for (int side = 0; side < 2; side++) {
-      raised_face copy = *face;
-      move_face(&copy, motion, side ? step : -step);
-      find_overlap(&copy, edges, m_edges, tie, strip, fade, moved + side);
-    }
-    const int is_same = moved[0].m == m && moved[1].m == m;
-    for (int i = 0; i < m; i++)
-      rate[i][motion] = is_same ? (moved[1].area[i] - moved[0].area[i]) / (2.0 * step) : 0.0;
-  }
-}
-
-/* Write point `i`, if there is room for it. face_a, face_b: faces of the blocks; normal: outward of the
- * block whose plane it is; base: a point of this plane */
-static void write_point(const dem_points *out, long long i, long long face_a, long long face_b,
-                        int plane_is_of_a, const double *point, const double *normal,
-                        const double *base, double area)
-{
+  const long long i = first + number;
   if (i >= out->capacity) return;
+  out->number[i] = number;
   out->face_a[i] = face_a;
   out->face_b[i] = face_b;
   out->plane_is_of_a[i] = (unsigned char) plane_is_of_a;
@@ -455,6 +483,7 @@ static void write_point(const dem_points *out, long long i, long long face_a, lo
     out->normal[3 * i + j] = normal[j];
     out->base[3 * i + j] = base[j];
     out->area_rate[6 * i + j] = out->area_rate[6 * i + 3 + j] = 0.0;
+    out->closure_rate[6 * i + j] = out->closure_rate[6 * i + 3 + j] = 0.0;
   }
 }
 
@@ -470,70 +499,89 @@ static int corner_of_plane(const raised_face *f, double (*edges)[2], int m_edges
   return -1;
 }
 
-/* Contact points of face f of one block with face g of another, in whose plane they are clipped,
- * written from point `count` on. f_is_of_a: whether f belongs to the block with the lower number;
- * strip (m): width at an edge; height (m): of the lowest point of the overlap over the plane. Returns
- * how many there are, or TOO_MANY_CORNERS. */
-static long long touch(const dem_solids *s, long long f, long long g, int f_is_of_a, double max_gap,
+/* Face f of one block over the plane of face g of another one */
+typedef struct {
+  const double *origin, *normal; /* of the plane */
+  double axis[3][3];             /* two axes of the plane, and its normal */
+  double edges[MAX_CORNERS][2];  /* corners of g in the plane */
+  int m_edges;
+  raised_face face; /* f */
+} face_pair;
+
+/* Returns 0, or TOO_MANY_CORNERS */
+static int set_face_pair(const dem_solids *s, long long f, long long g, face_pair *out)
+{
+  const long long *ring = s->corner + s->first_corner[g], *ring_f = s->corner + s->first_corner[f];
+  const int m_f = (int) (s->first_corner[f + 1] - s->first_corner[f]);
+  const int m_g = (int) (s->first_corner[g + 1] - s->first_corner[g]);
+  double (*axis)[3] = out->axis;
+  if (m_f + m_g > MAX_CORNERS - 1) return TOO_MANY_CORNERS;
+  out->origin = s->vertex + 3 * ring[0];
+  out->normal = s->normal + 3 * g;
+  out->face.m = m_f;
+  out->m_edges = m_g;
+  subtract(s->vertex + 3 * ring[1], out->origin, axis[0]);
+  const double length = sqrt(dot(axis[0], axis[0]));
+  for (int j = 0; j < 3; j++) axis[0][j] /= length;
+  cross(out->normal, axis[0], axis[1]);
+  memcpy(axis[2], out->normal, sizeof axis[2]);
+  for (int i = 0; i < m_f; i++) {
+    double at[3];
+    subtract(s->vertex + 3 * ring_f[m_f - 1 - i], out->origin, at);
+    for (int k = 0; k < 3; k++) out->face.corner[i][k] = dot(at, axis[k]);
+  }
+  for (int k = 0; k < 3; k++) out->face.normal[k] = dot(s->normal + 3 * f, axis[k]);
+  for (int i = 0; i < m_g; i++) {
+    double at[3];
+    subtract(s->vertex + 3 * ring[i], out->origin, at);
+    for (int k = 0; k < 2; k++) out->edges[i][k] = dot(at, axis[k]);
+  }
+  return 0;
+}
+
+/* Height of the lowest corner of a face over the plane of another one */
+static double lowest_corner(const face_pair *pair)
+{
+  double lowest = HUGE_VAL;
+  for (int i = 0; i < pair->face.m; i++) lowest = fmin(lowest, pair->face.corner[i][2]);
+  return lowest;
+}
+
+/* Place on the face over corner i of the overlap */
+static void point_on_face(const face_pair *pair, const overlap *found, int i, double *point)
+{
+  const double *here = found->polygon[i];
+  const double up = found->height + dot_2(found->gradient, here);
+  for (int j = 0; j < 3; j++)
+    point[j] = pair->origin[j] + here[0] * pair->axis[0][j] + here[1] * pair->axis[1][j] +
+               up * pair->normal[j];
+}
+
+/* Contact points of face f of block a that lies on face g of block b, written from point `count` on;
+ * height (m): of the lowest point of the overlap over the plane. Returns how many there are, or
+ * TOO_MANY_CORNERS. */
+static long long touch(const dem_solids *s, long long f, long long g, double max_gap,
                        double max_depth, double tie, double strip, long long count,
                        const dem_points *out, double *height)
 {
-  const double *normal = s->normal + 3 * g;
   const long long *ring = s->corner + s->first_corner[g], *ring_f = s->corner + s->first_corner[f];
-  const double *origin = s->vertex + 3 * ring[0];
-  const int m_f = (int) (s->first_corner[f + 1] - s->first_corner[f]);
-  const int m_g = (int) (s->first_corner[g + 1] - s->first_corner[g]);
-  if (m_f + m_g > MAX_CORNERS - 1) return TOO_MANY_CORNERS;
-  double axis[3][3], edges[MAX_CORNERS][2], lowest = HUGE_VAL;
-  raised_face face;
-  face.m = m_f;
-  subtract(s->vertex + 3 * ring[1], origin, axis[0]);
-  const double length = sqrt(dot(axis[0], axis[0]));
-  for (int j = 0; j < 3; j++) axis[0][j] /= length;
-  cross(normal, axis[0], axis[1]);
-  memcpy(axis[2], normal, sizeof axis[2]);
-  for (int i = 0; i < m_f; i++) {
-    double at[3];
-    subtract(s->vertex + 3 * ring_f[m_f - 1 - i], origin, at);
-    for (int k = 0; k < 3; k++) face.corner[i][k] = dot(at, axis[k]);
-    if (face.corner[i][2] < lowest) lowest = face.corner[i][2];
-  }
-  if (!(lowest < max_gap)) return 0;
-  for (int k = 0; k < 3; k++) face.normal[k] = dot(s->normal + 3 * f, axis[k]);
-  for (int i = 0; i < m_g; i++) {
-    double at[3];
-    subtract(s->vertex + 3 * ring[i], origin, at);
-    for (int k = 0; k < 2; k++) edges[i][k] = dot(at, axis[k]);
-  }
-  const double fade = DEM_FADE_PER_GAP * max_gap;
+  face_pair pair;
+  if (set_face_pair(s, f, g, &pair)) return TOO_MANY_CORNERS;
+  if (!(lowest_corner(&pair) < max_gap)) return 0;
   overlap found;
-  find_overlap(&face, edges, m_g, tie, strip, fade, &found);
+  find_overlap(&pair.face, pair.edges, pair.m_edges, tie, strip, DEM_FADE_PER_GAP * max_gap, &found);
   *height = found.lowest;
   if (!(found.lowest < max_gap && found.lowest > -max_depth)) return 0;
-  const int is_flush = !(hypot(face.normal[0], face.normal[1]) > DEM_FLUSH_SINE);
   for (int i = 0; i < found.m; i++) {
-    const double *here = found.polygon[i];
-    const int corner = is_flush ? corner_of_plane(&face, edges, m_g, here, tie) : -1;
+    const int corner = corner_of_plane(&pair.face, pair.edges, pair.m_edges, found.polygon[i], tie);
     if (corner >= 0) {
-      write_point(out, count + i, f_is_of_a ? f : g, f_is_of_a ? g : f, f_is_of_a,
-                  s->vertex + 3 * ring[corner], s->normal + 3 * f, s->vertex + 3 * ring_f[0],
-                  found.area[i]);
+      write_point(out, count, i, f, g, 1, s->vertex + 3 * ring[corner], s->normal + 3 * f,
+                  s->vertex + 3 * ring_f[0], found.area[i]);
       continue;
     }
-    const double up = found.height + found.gradient[0] * here[0] + found.gradient[1] * here[1];
     double point[3];
-    for (int j = 0; j < 3; j++)
-      point[j] = origin[j] + here[0] * axis[0][j] + here[1] * axis[1][j] + up * normal[j];
-    write_point(out, count + i, f_is_of_a ? f : g, f_is_of_a ? g : f, !f_is_of_a, point, normal,
-                origin, found.area[i]);
-  }
-  if (found.m > 0 && !is_flush) {
-    double rate[MAX_CORNERS][6];
-    find_area_rates(&face, edges, m_g, tie, strip, fade, found.m, rate);
-    for (int i = 0; i < found.m && count + i < out->capacity; i++)
-      for (int j = 0; j < 6; j++)
-        for (int k = 0; k < 3; k++)
-          out->area_rate[6 * (count + i) + j] += rate[i][3 * (j / 3) + k] * axis[k][j % 3];
+    point_on_face(&pair, &found, i, point);
+    write_point(out, count, i, f, g, 0, point, pair.normal, pair.origin, found.area[i]);
   }
   return found.m;
 }
@@ -576,56 +624,72 @@ static long long deepest_vertex(const dem_solids *s, long long i, const double *
   return deepest;
 }
 
-/* Where two blocks are farthest apart along the product of two edges that cross */
+/* Two edges that cross: the points next to each other on both, and the direction normal to both */
 typedef struct {
   double separation, normal[3], on_a[3], on_b[3]; /* normal from b to a */
   long long a[2], b[2];                           /* vertices of the edges */
   double inside;                                  /* least distance from their ends */
+  double sine, length;                            /* of the angle between them; of the shorter one */
 } crossing;
+
+/* The crossing of edges `a` and `b`, whose normal has any sign; returns 0 where the lines are parallel or
+ * cross beyond the ends of an edge */
+static int cross_edges(const dem_solids *s, const long long *a, const long long *b, crossing *out)
+{
+  double one[3], other[3], between[3], part[3];
+  const double *start_a = s->vertex + 3 * a[0], *start_b = s->vertex + 3 * b[0];
+  subtract(s->vertex + 3 * a[1], start_a, one);
+  subtract(s->vertex + 3 * b[1], start_b, other);
+  cross(one, other, out->normal);
+  const double square = dot(out->normal, out->normal), size = sqrt(square);
+  const double length_a = sqrt(dot(one, one)), length_b = sqrt(dot(other, other));
+  out->sine = size / (length_a * length_b);
+  if (out->sine < DEM_CROSSING_SINE) return 0;
+  subtract(start_b, start_a, between);
+  cross(between, other, part);
+  const double along_a = dot(part, out->normal) / square;
+  cross(between, one, part);
+  const double along_b = dot(part, out->normal) / square;
+  out->inside = fmin(fmin(along_a, 1.0 - along_a) * length_a, fmin(along_b, 1.0 - along_b) * length_b);
+  if (!(out->inside >= 0.0)) return 0;
+  out->length = fmin(length_a, length_b);
+  for (int j = 0; j < 3; j++) {
+    out->normal[j] /= size;
+    out->on_a[j] = start_a[j] + along_a * one[j];
+    out->on_b[j] = start_b[j] + along_b * other[j];
+  }
+  memcpy(out->a, a, sizeof out->a);
+  memcpy(out->b, b, sizeof out->b);
+  return 1;
+}
+
+/* Area of the joint where two edges cross: of the overlap of two strips along them, no longer than the
+ * shorter edge. It fades within `fade` of the ends of both, and as they become parallel, where their
+ * crossing would move along them at almost no motion of the blocks. */
+static double crossing_area(const crossing *at, double strip, double fade)
+{
+  const double share = fmin(at->inside / fade, 1.0) *
+                       (1.0 - falling_ramp(at->sine, DEM_CROSSING_SINE, DEM_STRIP_SINE));
+  return share * strip * strip / hypot(at->sine, strip / at->length);
+}
 
 /* Compare the crossing of edges `a` and `b` with the best one so far */
 static void try_crossing(const dem_solids *s, long long block_a, long long block_b,
                          const long long *a, const long long *b, crossing *best)
 {
-  double one[3], other[3], normal[3], between[3];
-  const double *start_a = s->vertex + 3 * a[0], *start_b = s->vertex + 3 * b[0];
-  subtract(s->vertex + 3 * a[1], start_a, one);
-  subtract(s->vertex + 3 * b[1], start_b, other);
-  cross(one, other, normal);
-  const double square = dot(normal, normal), size = sqrt(square);
-  if (size < DEM_CROSSING_SINE * sqrt(dot(one, one) * dot(other, other))) return;
-  subtract(start_b, start_a, between);
-  double part[3];
-  cross(between, other, part);
-  const double along_a = dot(part, normal) / square;
-  cross(between, one, part);
-  const double along_b = dot(part, normal) / square;
-  if (!(along_a >= 0.0 && along_a <= 1.0 && along_b >= 0.0 && along_b <= 1.0)) return;
-  for (int j = 0; j < 3; j++) normal[j] /= size;
-  double low_a, high_a, low_b, high_b;
-  extent(s, block_a, normal, &low_a, &high_a);
-  extent(s, block_b, normal, &low_b, &high_b);
-  const double separation = low_a - high_b > low_b - high_a ? low_a - high_b : low_b - high_a;
-  if (!(separation > best->separation)) return;
+  crossing here;
+  if (!cross_edges(s, a, b, &here)) return;
+  double low_a, high_a, low_b, high_b, between[3];
+  extent(s, block_a, here.normal, &low_a, &high_a);
+  extent(s, block_b, here.normal, &low_b, &high_b);
   const double sign = low_a - high_b > low_b - high_a ? 1.0 : -1.0;
-  double on_a[3], on_b[3], gap = 0.0;
-  for (int j = 0; j < 3; j++) {
-    on_a[j] = start_a[j] + along_a * one[j];
-    on_b[j] = start_b[j] + along_b * other[j];
-    gap += sign * normal[j] * (on_a[j] - on_b[j]);
-  }
-  if (fabs(gap - separation) > DEM_CROSSING_ERROR * sqrt(dot(one, one)))
+  here.separation = sign > 0.0 ? low_a - high_b : low_b - high_a;
+  if (!(here.separation > best->separation)) return;
+  for (int j = 0; j < 3; j++) here.normal[j] *= sign;
+  subtract(here.on_a, here.on_b, between);
+  if (fabs(dot(between, here.normal) - here.separation) > DEM_CROSSING_ERROR * here.length)
     return; /* other vertices are nearer along this direction */
-  best->separation = separation;
-  best->inside = fmin(fmin(along_a, 1.0 - along_a) * sqrt(dot(one, one)),
-                      fmin(along_b, 1.0 - along_b) * sqrt(dot(other, other)));
-  for (int j = 0; j < 3; j++) {
-    best->normal[j] = sign * normal[j];
-    best->on_a[j] = on_a[j];
-    best->on_b[j] = on_b[j];
-  }
-  memcpy(best->a, a, sizeof best->a);
-  memcpy(best->b, b, sizeof best->b);
+  *best = here;
 }
 
 /* The crossing of edges of two blocks along which they are farthest apart, if that is farther than
@@ -653,47 +717,267 @@ static crossing find_crossing(const dem_solids *s, long long block_a, long long 
   return best;
 }
 
+/* A block that stands on the plane of a face of the other one */
+typedef struct {
+  long long plane, vertex, face; /* face of the plane; lowest vertex over it; face that is clipped */
+  int side;                      /* 0 if the plane is of block a, 1 if of b */
+  double height;                 /* of the vertex over the plane */
+} standing;
+
+/* How two blocks touch along edges and at corners */
+typedef struct {
+  standing plane[MAX_PLANES];
+  int planes;
+  crossing at; /* of two edges; at.a[0] is -1 if none cross */
+} edge_contact;
+
+/* Its geometry at a place of the blocks */
+typedef struct {
+  face_pair pair[MAX_PLANES];
+  overlap found[MAX_PLANES]; /* areas are weighted */
+  crossing at;
+  double crossing_area;
+} edge_geometry;
+
+/* The planes on which one of two blocks stands: of all faces, those over which the other block lies least
+ * deep, within `fade`. Returns 0 where the blocks are `max_gap` apart. */
+static int find_planes(const dem_solids *s, long long a, long long b, double max_gap, double fade,
+                       edge_contact *out)
+{
+  const long long block[2] = {a, b};
+  double largest = -HUGE_VAL;
+  out->planes = 0;
+  for (int side = 0; side < 2; side++)
+    for (long long f = s->first_face[block[side]]; f < s->first_face[block[side] + 1]; f++) {
+      standing here = {.plane = f, .side = side};
+      here.vertex =
+          deepest_vertex(s, block[1 - side], s->vertex + 3 * s->corner[s->first_corner[f]],
+                         s->normal + 3 * f, &here.height);
+      if (here.height >= max_gap) return 0;
+      if (!(here.height > largest - fade)) continue;
+      largest = fmax(largest, here.height);
+      int kept = 0, lowest = 0;
+      for (int i = 0; i < out->planes; i++)
+        if (out->plane[i].height > largest - fade) out->plane[kept++] = out->plane[i];
+      for (int i = 1; i < kept; i++)
+        if (out->plane[i].height < out->plane[lowest].height) lowest = i;
+      if (kept < MAX_PLANES) out->plane[kept++] = here;
+      else if (here.height > out->plane[lowest].height) out->plane[lowest] = here;
+      out->planes = kept;
+    }
+  for (int i = 0; i < out->planes; i++) {
+    standing *here = out->plane + i;
+    const double *normal = s->normal + 3 * here->plane;
+    const double down[3] = {-normal[0], -normal[1], -normal[2]};
+    here->face = face_at(s, block[1 - here->side], here->vertex, here->vertex, down);
+  }
+  return 1;
+}
+
+/* Areas of an edge contact at the present places of the blocks. The planes share the contact, the higher
+ * the lowest vertex over a plane, the more; what their contacts leave near borders of faces goes to the
+ * crossing. Returns 0, or TOO_MANY_CORNERS. */
+static int measure_edge_contact(const dem_solids *s, const edge_contact *contact, double tie,
+                                double strip, double fade, edge_geometry *out)
+{
+  double weight[MAX_PLANES], height[MAX_PLANES], largest = -HUGE_VAL, sum = 0.0, left = 1.0;
+  for (int i = 0; i < contact->planes; i++) {
+    const standing *here = contact->plane + i;
+    double at[3];
+    subtract(s->vertex + 3 * here->vertex, s->vertex + 3 * s->corner[s->first_corner[here->plane]], at);
+    height[i] = dot(at, s->normal + 3 * here->plane);
+    largest = fmax(largest, height[i]);
+  }
+  for (int i = 0; i < contact->planes; i++) {
+    const double near = fmax(1.0 - (largest - height[i]) / fade, 0.0);
+    weight[i] = near * near;
+    sum += weight[i];
+  }
+  for (int i = 0; i < contact->planes; i++) {
+    face_pair *pair = out->pair + i;
+    overlap *found = out->found + i;
+    const double part = weight[i] / sum;
+    if (set_face_pair(s, contact->plane[i].face, contact->plane[i].plane, pair))
+      return TOO_MANY_CORNERS;
+    find_overlap(&pair->face, pair->edges, pair->m_edges, tie, strip, fade, found);
+    for (int k = 0; k < found->m; k++) found->area[k] *= part;
+    left -= part * found->share;
+  }
+  out->crossing_area = 0.0;
+  if (contact->at.a[0] >= 0 && cross_edges(s, contact->at.a, contact->at.b, &out->at))
+    out->crossing_area = fmax(left, 0.0) * crossing_area(&out->at, strip, fade);
+  return 0;
+}
+
+/* Place a block where a small motion takes it: along axis `motion`, or from 3 on about an axis through
+ * its centroid. A step of 0 restores its place, bit for bit. */
+static void displace_block(const dem_solids *s, long long i, int motion, double step)
+{
+  const int axis = motion % 3, next = (axis + 1) % 3, last = (axis + 2) % 3;
+  const double cosine = cos(step), sine = sin(step);
+  place_block(s, i);
+  if (step == 0.0) return;
+  const double *position = s->position + 3 * i;
+  for (long long v = s->first_vertex[i]; v < s->first_vertex[i + 1]; v++) {
+    double *at = s->vertex + 3 * v;
+    if (motion < 3) {
+      at[axis] += step;
+      continue;
+    }
+    const double x = at[next] - position[next], y = at[last] - position[last];
+    at[next] = position[next] + cosine * x - sine * y;
+    at[last] = position[last] + sine * x + cosine * y;
+  }
+  for (long long f = s->first_face[i]; f < s->first_face[i + 1] && motion >= 3; f++) {
+    double *normal = s->normal + 3 * f;
+    const double x = normal[next], y = normal[last];
+    normal[next] = cosine * x - sine * y;
+    normal[last] = sine * x + cosine * y;
+  }
+}
+
+/* Depth of the face below the plane at corner i of the overlap */
+static double depth_at(const overlap *found, int i)
+{
+  return -(found->height + dot_2(found->gradient, found->polygon[i]));
+}
+
+/* Areas of an overlap and their mean depths, over its corners next to each corner of another one: corners
+ * that lie on each other may change places within small motions */
+static void measure_next_to(const overlap *found, const overlap *corners, double *area, double *depth)
+{
+  for (int k = 0; k < corners->m; k++) area[k] = depth[k] = 0.0;
+  for (int i = 0; i < found->m; i++) {
+    double smallest = HUGE_VAL;
+    int nearest = 0;
+    for (int k = 0; k < corners->m; k++) {
+      const double distance = hypot(found->polygon[i][0] - corners->polygon[k][0],
+                                    found->polygon[i][1] - corners->polygon[k][1]);
+      if (distance < smallest) {
+        smallest = distance;
+        nearest = k;
+      }
+    }
+    area[nearest] += found->area[i];
+    depth[nearest] += found->area[i] * depth_at(found, i);
+  }
+  for (int k = 0; k < corners->m; k++) depth[k] /= area[k]; /* NaN without a corner */
+}
+
+/* Derivatives of the areas and closures of an edge contact by motions of block b about its centroid,
+ * written to its points from `count` on. geometry: at the present places. */
+static void write_rates(const dem_solids *s, long long b, const edge_contact *contact,
+                        const edge_geometry *geometry, double tie, double strip, double fade,
+                        const int *first, long long count, const dem_points *out)
+{
+  edge_geometry moved[2];
+  const int is_crossing = geometry->crossing_area > tie * tie;
+  for (int motion = 0; motion < 6; motion++) {
+    const double step = DEM_DIFFERENCE * (motion < 3 ? strip : 1.0);
+    for (int side = 0; side < 2; side++) {
+      displace_block(s, b, motion, side ? step : -step);
+      measure_edge_contact(s, contact, tie, strip, fade, moved + side);
+    }
+    for (int i = 0; i < contact->planes; i++) {
+      const overlap *here = geometry->found + i;
+      double area[2][MAX_CORNERS], depth[2][MAX_CORNERS];
+      if (first[i] < 0) continue;
+      for (int side = 0; side < 2; side++)
+        measure_next_to(moved[side].found + i, here, area[side], depth[side]);
+      for (int k = 0; k < here->m; k++) {
+        const long long at = count + first[i] + k;
+        if (at >= out->capacity) continue;
+        const double rate = (depth[1][k] - depth[0][k]) / (2.0 * step);
+        out->area_rate[6 * at + motion] = (area[1][k] - area[0][k]) / (2.0 * step);
+        out->closure_rate[6 * at + motion] = isfinite(rate) ? rate : 0.0;
+      }
+    }
+    const long long at = count + first[MAX_PLANES];
+    if (is_crossing && at < out->capacity)
+      out->area_rate[6 * at + motion] =
+          (moved[1].crossing_area - moved[0].crossing_area) / (2.0 * step);
+  }
+  displace_block(s, b, 0, 0.0);
+}
+
+/* Turn derivatives by motions of block b about its centroid into derivatives by motions of the block of
+ * the point about the base */
+static void refer_to_base(const dem_solids *s, long long b, long long i, const dem_points *out,
+                          double *rate)
+{
+  double arm[3], turn[3];
+  subtract(s->position + 3 * b, out->base + 3 * i, arm);
+  cross(arm, rate, turn);
+  for (int j = 0; j < 3; j++) rate[3 + j] += turn[j];
+  for (int j = 0; j < 6 && !out->plane_is_of_a[i]; j++) rate[j] = -rate[j];
+}
+
+/* Leave of the rate of a closure its part by which the point slides on its block: without the rate of a
+ * point fixed to the block */
+static void keep_sliding(long long i, const dem_points *out)
+{
+  const double *normal = out->normal + 3 * i;
+  double *rate = out->closure_rate + 6 * i, arm[3], turn[3];
+  subtract(out->point + 3 * i, out->base + 3 * i, arm);
+  cross(arm, normal, turn);
+  for (int j = 0; j < 3; j++) {
+    rate[j] += normal[j];
+    rate[3 + j] += turn[j];
+  }
+}
+
 /* Contact points of two blocks that touch along an edge, at a corner, or where two edges cross,
  * written from point `count` on; returns how many there are, or TOO_MANY_CORNERS */
 static long long touch_at_edges(const dem_solids *s, long long a, long long b, double max_gap,
                                 double max_depth, double tie, double strip, long long count,
                                 const dem_points *out)
 {
-  const long long block[2] = {a, b};
+  const double fade = DEM_FADE_PER_GAP * max_gap;
+  edge_contact contact;
+  edge_geometry geometry;
+  int first[MAX_PLANES + 1], written = 0;
+  if (!find_planes(s, a, b, max_gap, fade, &contact)) return 0;
   double largest = -HUGE_VAL;
-  long long plane = -1, vertex = -1;
-  int side = 0; /* block of the plane */
-  for (int i = 0; i < 2; i++)
-    for (long long f = s->first_face[block[i]]; f < s->first_face[block[i] + 1]; f++) {
-      double height;
-      const long long deepest =
-          deepest_vertex(s, block[1 - i], s->vertex + 3 * s->corner[s->first_corner[f]],
-                         s->normal + 3 * f, &height);
-      if (height > largest) {
-        largest = height;
-        plane = f;
-        vertex = deepest;
-        side = i;
-      }
-      if (largest >= max_gap) return 0;
+  for (int i = 0; i < contact.planes; i++) largest = fmax(largest, contact.plane[i].height);
+  contact.at = find_crossing(s, a, b, largest - fade);
+  if (contact.at.separation >= max_gap) return 0;
+  if (measure_edge_contact(s, &contact, tie, strip, fade, &geometry)) return TOO_MANY_CORNERS;
+  for (int i = 0; i < contact.planes; i++) {
+    const standing *here = contact.plane + i;
+    const face_pair *pair = geometry.pair + i;
+    const overlap *found = geometry.found + i;
+    first[i] = -1;
+    if (!(found->lowest < max_gap && found->lowest > -max_depth)) continue;
+    first[i] = written;
+    for (int k = 0; k < found->m; k++) {
+      double point[3];
+      point_on_face(pair, found, k, point);
+      write_point(out, count + first[i], k, here->side ? here->face : here->plane,
+                  here->side ? here->plane : here->face, !here->side, point, pair->normal,
+                  pair->origin, found->area[k]);
     }
-  /* a crossing at the end of an edge has the direction of the face to second order: the face goes first */
-  const crossing best = find_crossing(s, a, b, largest + tie);
-  if (best.separation >= max_gap || best.separation <= -max_depth) return 0;
-  if (best.a[0] >= 0) {
-    const double share = fmin(best.inside / (DEM_FADE_PER_GAP * max_gap), 1.0);
-    if (!(share * strip * strip > tie * tie)) return 0;
-    const double down[3] = {-best.normal[0], -best.normal[1], -best.normal[2]};
-    write_point(out, count, face_at(s, a, best.a[0], best.a[1], down),
-                face_at(s, b, best.b[0], best.b[1], best.normal), 0, best.on_a, best.normal,
-                best.on_b, share * strip * strip);
-    return 1;
+    written += found->m;
   }
-  const double *normal = s->normal + 3 * plane;
-  const double down[3] = {-normal[0], -normal[1], -normal[2]};
-  const long long face = face_at(s, block[1 - side], vertex, vertex, down);
-  double height;
-  return touch(s, face, plane, side, max_gap, max_depth, tie, strip, count, out, &height);
+  first[MAX_PLANES] = written;
+  const crossing *at = &contact.at;
+  if (geometry.crossing_area > tie * tie && at->separation > -max_depth) {
+    const double down[3] = {-at->normal[0], -at->normal[1], -at->normal[2]};
+    write_point(out, count + written, 0, face_at(s, a, at->a[0], at->a[1], down),
+                face_at(s, b, at->b[0], at->b[1], at->normal), 0, at->on_a, at->normal, at->on_b,
+                geometry.crossing_area);
+    written++;
+  } else {
+    geometry.crossing_area = 0.0;
+  }
+  if (!written) return 0;
+  write_rates(s, b, &contact, &geometry, tie, strip, fade, first, count, out);
+  for (long long i = count; i < count + written && i < out->capacity; i++) {
+    refer_to_base(s, b, i, out, out->area_rate + 6 * i);
+    if (geometry.crossing_area > 0.0 && i == count + first[MAX_PLANES]) continue;
+    refer_to_base(s, b, i, out, out->closure_rate + 6 * i);
+    keep_sliding(i, out);
+  }
+  return written;
 }
 
 /* The contacts of two blocks, face on face, found so far */
@@ -709,6 +993,7 @@ static void remove_points(const dem_points *out, long long first, long long end,
   const long long last = count < out->capacity ? count : out->capacity;
   if (end >= last) return;
   const size_t n = (size_t) (last - end);
+  memmove(out->number + first, out->number + end, n * sizeof *out->number);
   memmove(out->face_a + first, out->face_a + end, n * sizeof *out->face_a);
   memmove(out->face_b + first, out->face_b + end, n * sizeof *out->face_b);
   memmove(out->plane_is_of_a + first, out->plane_is_of_a + end, n * sizeof *out->plane_is_of_a);
@@ -717,6 +1002,8 @@ static void remove_points(const dem_points *out, long long first, long long end,
   memmove(out->normal + 3 * first, out->normal + 3 * end, 3 * n * sizeof *out->normal);
   memmove(out->base + 3 * first, out->base + 3 * end, 3 * n * sizeof *out->base);
   memmove(out->area_rate + 6 * first, out->area_rate + 6 * end, 6 * n * sizeof *out->area_rate);
+  memmove(out->closure_rate + 6 * first, out->closure_rate + 6 * end,
+          6 * n * sizeof *out->closure_rate);
 }
 
 /* Add a contact of `found` points from `count` on to the contacts of two convex blocks, and keep those
@@ -774,7 +1061,7 @@ EXPORT long long dem_face_contacts(const dem_solids *s, long long p, const long 
         if (dot(s->normal + 3 * f, s->normal + 3 * g) > max_cosine) continue;
         double height;
         const long long found =
-            touch(s, f, g, 1, max_gap[i], max_depth[i], tie[i], strip[i], count, out, &height);
+            touch(s, f, g, max_gap[i], max_depth[i], tie[i], strip[i], count, out, &height);
         if (found == TOO_MANY_CORNERS) return found;
         if (found == 0) continue;
         count = add_face_pair(&kept, s->normal + 3 * g, height, count, found, out);

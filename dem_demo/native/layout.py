@@ -51,9 +51,11 @@ CONSTANTS = {
     "FADE_PER_GAP": Constant(0.125, "of the range of contacts: where an edge contact fades"),
     "WHOLE_EDGE_SINE": Constant(0.5, "sine of 30 degrees: an edge on an edge keeps its area"),
     "NO_EDGE_SINE": Constant(0.7071067811865476, "sine of 45 degrees: it has none"),
+    "MERGE_PER_FADE": Constant(0.3, "distance of a corner from a line on which it is no corner"),
     "EDGE_SINE": Constant(0.08715574274765817, "sine of 5 degrees: an edge along a contour line"),
     "CORNER_SINE": Constant(0.17364817766693033, "sine of 10 degrees: a corner between two edges"),
     "MIN_AREA_SHARE": Constant(0.1, "of the area of a point that follows its derivatives"),
+    "MAX_AREA_CHANGE": Constant(0.005, "of an area, of a closure by sliding: until a new search"),
     "DIFFERENCE": Constant(1e-6, "rad, and of the strip: motion in differences of areas"),
     "CROSSING_SINE": Constant(1e-3, "sine between two edges that cross"),
     "CROSSING_ERROR": Constant(1e-9, "of the length of an edge: rounding of a distance of blocks"),
@@ -283,6 +285,7 @@ SOLIDS = {
 }
 POINTS = {
     "capacity": Field("long long", "points that the arrays have room for"),
+    "number": Field("long long *", "(capacity,): of the point in its contact"),
     "face_a": Field("long long *", "(capacity,): face of the block with the lower number"),
     "face_b": Field("long long *", "(capacity,): face of the other block"),
     "plane_is_of_a": Field("unsigned char *", "(capacity,): 0 where the plane belongs to b"),
@@ -291,6 +294,7 @@ POINTS = {
     "base": Field("double *", "(capacity, 3): a point of the plane, m"),
     "area": Field("double *", "(capacity,): m2"),
     "area_rate": Field("double *", "(capacity, 6): of the area by motions of the point's block"),
+    "closure_rate": Field("double *", "(capacity, 6): of the closure, as the point slides"),
 }
 FACE_POINTS = {
     "n_blocks": Field("long long", "n"),
@@ -307,6 +311,7 @@ FACE_POINTS = {
     "found_area": Field("const double *", "(k,): m2, when the point was found"),
     "found_at": Field("const double *", "(k, 12): motions of a, b then"),
     "area_gradient": Field("const double *", "(k, 12): of the area by motions of a, b"),
+    "sliding_gradient": Field("const double *", "(k, 12): of the closure, as the point slides"),
     "area": Field("double *", "(k,): m2"),
     "kinematics": Field("double *", "(k, 3, 12): of closure and shears by motions of a, b"),
 }

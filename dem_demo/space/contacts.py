@@ -16,7 +16,8 @@ The roles never change; they follow from the numbers of the blocks alone.
 Blocks whose faces are tilted by more than 2 degrees against each other stand on an edge or a
 corner, or two of their edges cross. Then the point belongs to the block that stands on the other
 one, and the plane and the directions of the law to the other one, whichever of them is a. The joint
-along an edge is a strip whose width is given.
+along an edge is a strip whose width is given. Areas, and closures of points that slide along the
+border of a face, have derivatives by the motions of the blocks, which are forces in a run.
 
 The geometry is computed by `native/face_contacts.c`, which knows no Python and no law, so another
 code can carry it.
@@ -144,8 +145,9 @@ class ContactPoints(NamedTuple):
     (k, 3) in m: on the other block. normal (k, 3): of the plane, out of its block; base (k, 3): a
     point of it, in m. area (k,) in m2; area_rate (k, 6): its derivatives by displacements of the
     block of the point against the block of the plane (m), and by rotations about axes x, y, z
-    through `base` (m2); zero for faces that lie on each other. contact (k,): number of the contact
-    of two faces.
+    through `base` (m2); zero for faces that lie on each other. closure_rate (k, 6): derivatives of
+    the closure beyond those of a point fixed to its block, as the point slides on it. contact (k,):
+    number of the contact of two faces.
     """
 
     block_a: np.ndarray
@@ -158,6 +160,7 @@ class ContactPoints(NamedTuple):
     base: np.ndarray
     area: np.ndarray
     area_rate: np.ndarray
+    closure_rate: np.ndarray
     contact: np.ndarray
 
     @property
@@ -217,15 +220,15 @@ def find_contacts(
     strip = np.minimum(corner_length, MAX_STRIP_PER_WIDTH * width)
     room = POINTS_PER_PAIR * len(pairs)
     while True:
-        face_a, face_b = np.empty((2, room), np.int64)
+        number, face_a, face_b = np.empty((3, room), np.int64)
         plane_is_of_a = np.empty(room, bool)
         point, normal, base = np.empty((3, room, 3))
         area = np.empty(room)
-        area_rate = np.empty((room, 6))
+        area_rate, closure_rate = np.empty((2, room, 6))
         out = PointArrays(capacity=room)
         out.bind(
-            face_a=face_a, face_b=face_b, plane_is_of_a=plane_is_of_a, point=point, normal=normal,
-            base=base, area=area, area_rate=area_rate,
+            number=number, face_a=face_a, face_b=face_b, plane_is_of_a=plane_is_of_a, point=point,
+            normal=normal, base=base, area=area, area_rate=area_rate, closure_rate=closure_rate,
         )  # fmt: skip
         places = map(address, (pairs, max_gap, max_depth, tie, strip))
         count = surfaces.arrays.call("face_contacts", len(pairs), *places, address(out))
@@ -235,11 +238,12 @@ def find_contacts(
             break
         room = count
     face_a, face_b = face_a[:count], face_b[:count]
-    starts = np.append(True, np.diff(face_a).astype(bool) | np.diff(face_b).astype(bool))[:count]
+    contact = np.cumsum(number[:count] == 0) - 1
     return ContactPoints(
         surfaces.block_of_face[face_a], surfaces.block_of_face[face_b], face_a, face_b,
         plane_is_of_a[:count].copy(), point[:count].copy(), normal[:count].copy(),
-        base[:count].copy(), area[:count].copy(), area_rate[:count].copy(), np.cumsum(starts) - 1,
+        base[:count].copy(), area[:count].copy(), area_rate[:count].copy(),
+        closure_rate[:count].copy(), contact,
     )  # fmt: skip
 
 
@@ -286,9 +290,13 @@ def contact_axes(surfaces: Surfaces, points: ContactPoints, axis_2: np.ndarray) 
     return np.stack([normal, axis_2, np.cross(normal, axis_2)], axis=1)
 
 
-def area_gradients(surfaces: Surfaces, points: ContactPoints) -> np.ndarray:
-    """Derivatives (k, 12) of areas of contact points by the motions of block a, then of block b."""
-    slope, moment = points.area_rate[:, :3], points.area_rate[:, 3:]
+def motion_gradients(surfaces: Surfaces, points: ContactPoints, rate: np.ndarray) -> np.ndarray:
+    """Derivatives (k, 12) by the motions of block a, then of block b.
+
+    rate (k, 6): derivatives by displacements of the block of the point against the block of the
+    plane, and by rotations through `base`.
+    """
+    slope, moment = rate[:, :3], rate[:, 3:]
     parts = []
     for block, owns_plane in (
         (points.block_a, points.plane_is_of_a),
@@ -321,7 +329,8 @@ def contact_rows(surfaces: Surfaces, points: ContactPoints, axes: np.ndarray) ->
     rows.closure[:] = points.closure
     rows.area[:] = points.area
     rows.kinematics[:] = np.concatenate(parts, axis=2)
-    rows.area_gradient[:] = area_gradients(surfaces, points)
+    rows.kinematics[:, 0] += motion_gradients(surfaces, points, points.closure_rate)
+    rows.area_gradient[:] = motion_gradients(surfaces, points, points.area_rate)
     first = np.searchsorted(points.contact, points.contact)
     rows.keys[:] = points.face_a, points.face_b, np.arange(k) - first
     return rows

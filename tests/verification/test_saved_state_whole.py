@@ -156,10 +156,11 @@ DUG_IN_SPACE = (
     + lines(box=[1.0, 1.0, 0.4], at=[0.1, 0.0, 0.75])
     + "[run]\nend = 1.0\nrecord = 0.003\n"
 )
-# In space a block stands on its edge, whose strip widens as it falls back on the base
+# In space a block stands on its edge next to the border of the base, and falls back on the base, so
+# that its strip widens and its points slide along the border
 TIPPED = (
     f"[laws.soft]\n{coulomb(0.6, 1e9, 5e8)}"
-    + block("base", box=[4.0, 4.0, 1.0], at=[0.0, 0.0, -0.5], fixed=True)
+    + block("base", box=[4.0, 4.0, 1.0], at=[-1.999, 0.0, -0.5], fixed=True)
     + block("one", corners=on_its_edge([0.5, 1.0, 1.5], 3.5), spin=[0.0, -0.1, 0.02])
     + "[run]\nend = 1.0\nrecord = 0.003\nsettle = false\nstep = 2e-4\n"
 )

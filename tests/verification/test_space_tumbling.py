@@ -284,6 +284,56 @@ def test_a_block_that_rocks_on_a_block_with_flush_sides(tilt, shift, floor_first
     assert tilt_of(sim, int(floor_first)) > (0.3 if end < 0.3 else 1.9)
 
 
+def across_border(tilt, turn, shift, end, low_size=(0.5, 1.0, 1.0), friction=0.9):
+    """A block on its edge, tilted and turned (degrees), on a block whose border the middle of the
+    edge lies inside by a shift (m); below 0 beyond it."""
+    width, depth, height = low_size
+    at = [shift - 0.5 * width, 0.0, -0.5 * height]
+    text = f"[laws.rock]\n{coulomb(friction, 1e9, 5e8)}"
+    text += block("low", box=[width, depth, height], at=at, fixed=True)
+    text += block("top", corners=tilted([0.5, 1.0, 2.0], tilt, turn))
+    return SpaceSimulation(parse(f"{text}[run]\nend = {end}\nstep = 2e-4\n{NO_DASHPOTS}"))
+
+
+def error_across_border(sim):
+    """Largest error of the energy balance until the end, over the energy turned over.
+
+    The overlap of both blocks is seen by their contacts all the time.
+    """
+    balance = sim.energy_balance
+    surfaces = sim.blocks.surfaces
+    errors = []
+    while sim.time < sim.scene.run.end:
+        sim.step()
+        errors.append(balance.total - balance.start)
+        sim.blocks.place()
+        overlap = -surfaces.separations(np.array([[0, 1]]), 0.0)[0]
+        assert overlap <= SEEN * sim.contacts.closure.max(initial=0.0) + ROUNDING, sim.time
+    return np.abs(errors).max() / balance.value["turnover"]
+
+
+ACROSS_BORDER = [
+    (tilt, turn, shift)
+    for tilt in (5.0, 8.0, 15.0, 20.0, 30.0)
+    for turn in (0.0, 10.0, 25.0, 45.0)
+    for shift in (-0.05, 0.0, 0.05)
+    if (tilt, turn) != (5.0, 45.0)  # 0.54 %: docs/space.md, Limits
+]
+
+
+@pytest.mark.parametrize(
+    ("tilt", "turn", "shift", "end"),
+    [
+        (20.0, 25.0, 0.0, 0.11),
+        *(pytest.param(*case, 0.3, marks=pytest.mark.slow) for case in ACROSS_BORDER),
+    ],
+)
+def test_an_edge_across_the_border_of_a_face_keeps_the_balance_of_energy(tilt, turn, shift, end):
+    """The contact of the edge passes from the strip to a crossing of edges and back, and from the
+    plane of one block to the other, without dashpots: within 0.4 % of the energy turned over."""
+    assert error_across_border(across_border(tilt, turn, shift, end)) < 4e-3
+
+
 @pytest.mark.parametrize("angle", [90.0, pytest.param(60.0, marks=pytest.mark.slow)])
 def test_bars_whose_edges_cross_see_their_overlap(angle):
     """A bar on its edge falls by 5 mm across the upper edge of another one, without dashpots, and

@@ -14,7 +14,8 @@ The length of joint that a contact stands for therefore depends on how the corne
 - in between, a smooth interpolation;
 - within `transition_length` of the end of an edge, where the side over the edge is raised by more
   than 30 degrees: less, none at the end, where blocks meet in a point. Up to 20 degrees the length
-  is kept, so that a block rocks on the end of another one.
+  is kept, so that a block rocks on the end of another one, unless three blocks are drawn with
+  corners in this point: one of them may fill the opening between both sides, as a wedge in a roof.
 
 Any change of this length changes the stored energy of the contact. Minus the stored energy per
 length times the derivative of the length is hence a force, which acts on the two blocks
@@ -31,6 +32,7 @@ holds their dot product (real part) and cross product (imaginary part).
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..compiled import CornerArrays, address
 from ..scene import Block
@@ -46,7 +48,8 @@ class Outlines:
     previous, next (c,): block of each corner, and the corners before and after it. first_corner
     (blocks + 1,): number of the first corner of each block, and c. corner_position, edge_direction
     (c,): at the present motion, written by the compiled step. corner_length (m): length of joint at
-    a corner that stands on an edge; transition_length (m): distance over which one corner gives way
+    a corner that stands on an edge; is_junction (c,): corners in whose place two or more other
+    blocks have one, as drawn; transition_length (m): distance over which one corner gives way
     to another. thickness (m): of the blocks.
     """
 
@@ -70,6 +73,8 @@ class Outlines:
         edge = self.local_corner[self.next] - self.local_corner
         self.edge_length = np.abs(edge)
         self.local_direction = edge / self.edge_length
+        drawn = np.concatenate([block.corners for block in blocks])
+        self.is_junction = find_junctions(drawn, self.block, transition_length)
         neighbours = np.stack([self.previous, self.next], axis=1)
         reverse = self.local_direction.conj()[:, None]
         self.neighbour_direction = self.local_direction[neighbours] * reverse
@@ -92,10 +97,20 @@ class Outlines:
         )
         arrays.bind(
             self, "local_corner", "local_direction", "neighbour_direction", "edge_length", "block",
-            "previous", "next", "corner_position", "edge_direction",
+            "previous", "next", "is_junction", "corner_position", "edge_direction",
             motion=np.ascontiguousarray(motion, float),
         )  # fmt: skip
         return arrays
+
+
+def find_junctions(corners: np.ndarray, block: np.ndarray, distance: float) -> np.ndarray:
+    """Mask (c,) of the corners (c, 2) that lie within a distance (m) of corners of two or more
+    other blocks; block (c,): block of each corner."""
+    pairs = cKDTree(corners).query_pairs(distance, output_type="ndarray")
+    pairs = np.concatenate([pairs, pairs[:, ::-1]])
+    others = np.unique(np.stack([pairs[:, 0], block[pairs[:, 1]]], axis=1), axis=0)
+    is_other = block[others[:, 0]] != others[:, 1]
+    return np.bincount(others[is_other, 0], minlength=len(corners)) >= 2
 
 
 class Contacts(ContactRows):

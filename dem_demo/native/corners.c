@@ -11,8 +11,8 @@
 
 #define FACE_SINE 0.03489949670250097   /* of 2 degrees: up to this tilt an edge lies on another */
 #define CORNER_SINE 0.08715574274765817 /* of 5 degrees: from this tilt on only its corner touches */
-#define SLIM_SINE 0.3420201433256687    /* of 20 degrees: up to it a corner bears at the end of an edge */
-#define POINT_SINE 0.5                  /* of 30 degrees: from it on blocks meet in a point there */
+#define SLIM_SINE 0.3420201433256687   /* of 20 degrees: up to it a corner bears at the end of an edge */
+#define POINT_SINE 0.5                    /* of 30 degrees: from it on blocks meet in a point there */
 #define MIN_OVERLAP 1e-10               /* m: shorter overlaps are rounding */
 #define LEVEL_SINE 1e-6                 /* least sine of a tilt beyond the limit of a range */
 #define MAX_TRANSFERS 8                 /* edges that a corner may go on by in a step */
@@ -186,14 +186,17 @@ static void locate_contact(const dem_corners *plane, long long i)
     standing[s] = rise[s] > 0.0 ? raised[s] : 0.0;
   }
   /* Two blocks of which one stands on the end of the other, such as columns that rock, bear on each
-   * other there. Blocks that meet in a point, such as the ones around a wedge, do not. Side `inward`
-   * of the corner extends from the nearer end over the edge. */
+   * other there. Blocks that are drawn with a third one in their common point, such as a wedge in the
+   * opening between both, do not. Side `inward` of the corner extends from the nearer end over the
+   * edge. */
   const int inward = local.x < edge_length - local.x ? 0 : 1;
+  const long long end = inward ? plane->next[edge] : edge; /* corner at the nearer end */
+  const int is_junction = plane->is_junction[corner] || plane->is_junction[end];
   const double both = standing[0] * standing[1];
   double corner_length = plane->corner_length, along = 0.0, by_share = 0.0, share_slope = 0.0;
   if (!(smaller(local.x, edge_length - local.x) >= width)) {
-    const double share =
-        share_at_end(rise[inward], ahead[inward] * side[inward].x, &share_slope);
+    const double cosine = ahead[inward] * side[inward].x;
+    const double share = is_junction ? 0.0 : share_at_end(rise[inward], cosine, &share_slope);
     corner_length = standing_length(plane, local.x, edge_length, share, &along, &by_share);
   }
   double length_per_rotation = -ahead[inward] * both * by_share * share_slope;

@@ -181,6 +181,7 @@ CORNERS = {
     "block": Field("const long long *", "(c,): block of the corner"),
     "previous": Field("const long long *", "(c,): corner before it"),
     "next": Field("const long long *", "(c,): corner after it"),
+    "is_junction": Field("const unsigned char *", "(c,): 1 for a point of three blocks as drawn"),
     "corner_position": Field("dem_vector *", "(c,): now, m"),
     "edge_direction": Field("dem_vector *", "(c,): now"),
     # ------------------------------------------------------------------ contacts: corner on edge

@@ -54,6 +54,10 @@ class PlainContacts:
         is_near_start = local.real < o.edge_length[edge] - local.real
         inward = np.where(is_near_start, 0, 1), np.arange(len(corner))
         share, by_tilt = _share_at_end(self.tilt_sine[inward], tilt_cosine[inward])
+        end = np.where(is_near_start, edge, o.next[edge])
+        is_point_of_two = ~(o.is_junction[corner] | o.is_junction[end])
+        share = share * is_point_of_two
+        by_tilt = by_tilt * is_point_of_two
         standing, along, by_share = _standing_length(
             o.corner_length, o.transition_length, local.real, o.edge_length[edge], share
         )

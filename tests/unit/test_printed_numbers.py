@@ -27,7 +27,7 @@ from dem_demo.output.record import bolt_summary, format_blocks
 from dem_demo.studies import ablate, compare
 from jointlaw.accuracy import slip as slip_tests
 from jointlaw.accuracy import suite, tradeoff
-from jointlaw.calibration import comparison, datasets, field, noise
+from jointlaw.calibration import comparison, datasets, estimates, field, noise
 from jointlaw.calibration.aperture import FlowConditions, FlowFit, FlowTest, read_flow
 from jointlaw.calibration.fit import Fit
 from jointlaw.calibration.meaning import describe
@@ -354,6 +354,19 @@ def test_table_of_peaks_and_interval_of_the_opening():
         opening,
     ).groups()
     assert [*map(float, numbers)] == pytest.approx([0.1, 0.5, 3.0, 12.0])
+
+
+def test_bands_of_stresses_above_a_hundredth_of_the_largest_are_logarithmic(monkeypatch):
+    stress = np.array([1e4, 1e6, -3e6])
+    curve = SimpleNamespace(stress=stress, opening=np.zeros(3))
+    monkeypatch.setattr(estimates, "simulate_curves", lambda *_: [curve])
+    fit = SimpleNamespace(
+        predict_shear=lambda *_: [curve], parameters=None, problem=SimpleNamespace(settings=None),
+        _derivative=lambda model: None,
+    )  # fmt: skip
+    small, values, _ = estimates.Estimates._linear_test(fit, curve)
+    assert small == pytest.approx(3e4)
+    np.testing.assert_allclose(small * np.sinh(values[0]), stress)
 
 
 def test_columns_of_points_beside_the_law():

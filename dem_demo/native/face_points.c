@@ -84,7 +84,7 @@ EXPORT long long dem_update_face_points(void *geometry, long long begin, long lo
     const double *found_at = points->found_at + 12 * i, *gradient = points->area_gradient + 12 * i;
     const double *sliding = points->sliding_gradient + 12 * i;
     double area = points->found_area[i], slid = 0.0;
-    for (int j = 0; j < 6; j++) {
+    for (int j = 0; j < 6 && points->has_gradients[i]; j++) {
       const double of_a = points->motion[j * n + a] - found_at[j];
       const double of_b = points->motion[j * n + b] - found_at[6 + j];
       area += gradient[j] * of_a + gradient[6 + j] * of_b;
@@ -96,6 +96,7 @@ EXPORT long long dem_update_face_points(void *geometry, long long begin, long lo
     for (int c = 0; c < 3; c++)
       fill_row(frame[c], axes, local_point, other_axes, other_arm, row + 12 * c,
                other_row + 12 * c);
+    if (!points->has_gradients[i]) continue;
     for (int j = 0; j < 12; j++) points->kinematics[36 * i + j] += sliding[j];
     changed += points->closure[i] > 0.0 &&
                (fabs(area - points->found_area[i]) > DEM_MAX_AREA_CHANGE * points->found_area[i] ||

@@ -309,6 +309,7 @@ FACE_POINTS = {
     "local_frame": Field("const double *", "(k, 3, 3): normal, axes of shear, in the other block"),
     "plane_offset": Field("const double *", "(k,): m, of the plane from the centroid of its block"),
     "closure": Field("double *", "(k,): m, depth of the point below the plane"),
+    "has_gradients": Field("const unsigned char *", "(k,): 0 where both gradients are zero"),
     "found_area": Field("const double *", "(k,): m2, when the point was found"),
     "found_at": Field("const double *", "(k, 12): motions of a, b then"),
     "area_gradient": Field("const double *", "(k, 12): of the area by motions of a, b"),

@@ -78,6 +78,8 @@ class FacePoints(ContactRows):
         self.keys[:] = keys
         for name, kind in POINT_ARRAYS.items():
             setattr(self, name, np.ascontiguousarray(arrays[name], kind))
+        gradients = np.concatenate([self.area_gradient, self.sliding_gradient], axis=1)
+        self.has_gradients = gradients.any(axis=1)  # false for faces that lie on each other
         self.block_a[:] = blocks.surfaces.block_of_face[self.face_a]
         self.block_b[:] = blocks.surfaces.block_of_face[self.face_b]
         self.arrays = FacePointArrays(n_blocks=len(blocks.names), n_points=k)
@@ -85,7 +87,7 @@ class FacePoints(ContactRows):
         self.arrays.bind(
             self, "block_a", "block_b", "plane_is_of_a", "local_point", "local_frame",
             "plane_offset", "closure", "kinematics", "found_area", "found_at", "area_gradient",
-            "sliding_gradient", "area",
+            "sliding_gradient", "has_gradients", "area",
         )  # fmt: skip
         self.update()
 

@@ -75,7 +75,7 @@ def test_bricks_do_not_move(angle, k0):
     assert largest_force / np.abs(sim.blocks.gravity).max() < 1e-8
 
 
-@pytest.mark.parametrize("k0", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("k0", [0.5, pytest.param(1.0, marks=pytest.mark.slow), 2.0])
 @pytest.mark.parametrize("law", ["plain", "rough"])
 def test_rock_cut_by_two_sets_bears_the_stress_and_stays(law, k0):
     sim = Simulation(cut(f"k0 = {k0}\nsurface = [[0, {10 * DEPTH}]]", FIXED_SIDES, law))

@@ -87,11 +87,16 @@ def on_both_bases(end=1.2, **keys):
     return slide(one_base, step), slide(sliding_slab(split=True, end=end, **keys), step)
 
 
-@LAWS
 @pytest.mark.parametrize(
-    "slant",
-    [0.0, 0.4, pytest.param(-0.4, marks=pytest.mark.slow)],
-    ids=["square", "forward", "back"],
+    ("law", "slant"),
+    [
+        pytest.param(COULOMB, 0.0, id="square-coulomb"),
+        pytest.param(ROCK, 0.0, id="square-rock"),
+        pytest.param(COULOMB, 0.4, id="forward-coulomb", marks=pytest.mark.slow),
+        pytest.param(ROCK, 0.4, id="forward-rock"),
+        pytest.param(COULOMB, -0.4, id="back-coulomb", marks=pytest.mark.slow),
+        pytest.param(ROCK, -0.4, id="back-rock", marks=pytest.mark.slow),
+    ],
 )
 def test_normal_force_between_floor_and_roof(law, slant):
     """Without the joint of its neighbour the contact would start anew: the slab loses its dilation
@@ -113,7 +118,10 @@ def layer(name, left, right, low, high, seams, **keys):
     )
 
 
-@LAWS
+@pytest.mark.parametrize(
+    "law",
+    [pytest.param(COULOMB, id="coulomb", marks=pytest.mark.slow), pytest.param(ROCK, id="rock")],
+)
 def test_two_slabs_under_a_divided_roof(law):
     """Two slabs in a row slide over two seams of the floor, and under two of the roof."""
     end = 0.8
@@ -151,7 +159,14 @@ def test_free_load(law):
     assert abs(two.energy_balance.error - one.energy_balance.error) < 5e-5
 
 
-@pytest.mark.parametrize("law", [COULOMB, ROCK, DEGRADING], ids=["coulomb", "rock", "degrading"])
+@pytest.mark.parametrize(
+    "law",
+    [
+        pytest.param(COULOMB, id="coulomb"),
+        pytest.param(ROCK, id="rock", marks=pytest.mark.slow),
+        pytest.param(DEGRADING, id="degrading"),
+    ],
+)
 def test_free_slab_that_tilts(law):
     """A slab slides down 45 degrees: friction tilts it forward, by 1e-5 to 2e-4.
 

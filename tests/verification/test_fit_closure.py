@@ -288,7 +288,11 @@ def law_of_field(**values):
 
 @pytest.mark.parametrize(
     ("jrc", "jcs"),
-    [(4.0, 100e6), (10.0, 100e6), pytest.param(16.0, 100e6, marks=pytest.mark.slow), (20.0, 200e6)],
+    [
+        (4.0, 100e6),
+        (10.0, 100e6),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((16.0, 100e6), (20.0, 200e6))),
+    ],
 )
 def test_law_from_field_values_has_barton_s_peak(jrc, jcs):
     """Angle of 30 + JRC log10(JCS/stress), displacement within a tenth (the peak is flat)."""

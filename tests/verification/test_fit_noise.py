@@ -147,9 +147,9 @@ def iterate(tests, has_specimens):
     ("points", "rho", "spread"),
     [
         ((2, 2, 2), 0.0, 0.0),
-        ((30, 30), 0.0, 0.0),
+        pytest.param((30, 30), 0.0, 0.0, marks=pytest.mark.slow),
         ((30, 30), 0.9, 0.0),
-        ((15, 15, 15), 0.0, 0.06),
+        pytest.param((15, 15, 15), 0.0, 0.06, marks=pytest.mark.slow),
         ((15, 15, 15, 15), 0.9, 0.06),
     ],
 )

@@ -57,9 +57,9 @@ def factor_of_bray(half_apex, stress, normal_stiffness, shear_stiffness):
 @pytest.mark.parametrize(
     "wedge",
     [
-        (20, 5e4, 1e10, 2e9),
+        pytest.param((20, 5e4, 1e10, 2e9), marks=pytest.mark.slow),
         (20, 3e4, 1e10, 2e9),  # below 1: softened shear springs would make it safer than it is
-        (30, 1e5, 1e10, 1e9),
+        pytest.param((30, 1e5, 1e10, 1e9), marks=pytest.mark.slow),
         (15, 3e4, 1e10, 3e9),
         pytest.param((25, 2e5, 1e10, 1e10), marks=pytest.mark.slow),
         pytest.param((35, 3e5, 5e9, 1e9), marks=pytest.mark.slow),
@@ -88,7 +88,10 @@ def shear_curve(stress, factor):
 
 
 @pytest.mark.parametrize("stress", [1e4, 1e6])
-@pytest.mark.parametrize("factor", [0.7, 1.2, 2.0, 3.0])
+@pytest.mark.parametrize(
+    "factor",
+    [0.7, *(pytest.param(factor, marks=pytest.mark.slow) for factor in (1.2, 2.0)), 3.0],
+)
 def test_reduced_rough_law_keeps_its_stiffness(stress, factor):
     """Its peak is divided by the factor within 1 %; normal stiffness stays within 4 %, the initial
     shear stiffness between 0.7 and 1.25 of the law's. Divided by the factor alone it would be 0.25

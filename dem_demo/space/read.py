@@ -224,8 +224,7 @@ def _block(table: Tables, density: float, where: str, files: Files) -> SpaceBloc
     """Build a block from its table; density (kg/m3): of the scene. Raises ValueError."""
     solid = _shape(table, f"{where}: block[{table['name']!r}]", files)
     faces = len(solid.faces)
-    prescribed = tuple(table.pop("fixed_motions", ())) if not table.get("fixed") else ()
-    table.pop("fixed_motions", None)
+    prescribed = tuple(table.pop("fixed_motions", ()))  # of free blocks, see `_apply_sides`
     return SpaceBlock(
         **{"density": density, **table, "solid": solid}, prescribed=prescribed,
         face_laws=(None,) * faces, face_axes=np.zeros((faces, 3)),

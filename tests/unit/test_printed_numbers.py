@@ -94,6 +94,14 @@ def test_properties_on_a_card():
     assert quantities(valid) == pytest.approx(expected, rel=1e-3)
 
 
+def test_stresses_on_a_card_that_plastic_asperities_do_not_reach():
+    def refuse(stress):
+        raise ValueError("not reached")
+
+    rows = card._properties(SimpleNamespace(closure=refuse))
+    assert rows == [f"{stress} | not reached | " for stress in ("0.1", "1", "10")]
+
+
 def test_meaning_of_a_law():
     lines = describe(LAW, [1e6, 4e6], assumed_stiffness=(40e9, 3e6))
     distance = 1e6**-0.5

@@ -43,7 +43,7 @@ NAMES = {  # value in SI units
 
 
 # A factor of a value in a text, as a power of ten; the unit may follow after other values
-POWER_OF_TEN = re.compile(rb"\{[^{}\n]*\b1e-?[369]\b[^{}\n]*\}")
+POWER_OF_TEN = re.compile(rb"\{[^{}\n]*\b1(?:e-?\d+|0+)\b[^{}\n]*\}")
 UNIT_BELOW = re.compile(
     r"\0(?:[\s\0,.()/+-]|and|to|or|after|at|is|it)*"
     r"((?:n|u|m|c|k|M|G)?(?:Pa s|Pa/m|Pa|N|J/m2|J|m))(?![\w/])"

@@ -42,9 +42,9 @@
 
 enum {
   MAX_CORNERS = 128, /* of two faces together */
-  MAX_FACE_PAIRS = 64, /* in contact, of two blocks */
+  MAX_FACE_PAIRS = 64, /* of two blocks, in contact */
   MAX_PLANES = 4,    /* that share a contact along an edge or at a corner */
-  TOO_MANY_CORNERS = -1
+  TOO_MANY_CORNERS = -1 /* or pairs of faces */
 };
 
 static double dot(const double *a, const double *b)

@@ -40,6 +40,7 @@ POINTS_PER_PAIR = 8  # room for points at first
 MIN_AXIS_SINE = 0.1  # between a rough direction and the normal of the plane that it lies in
 MAX_STRIP_PER_WIDTH = 0.5  # of the narrower block: widest joint along an edge
 MAX_FACE_CORNERS = 128  # of two faces, as in face_contacts.c
+MAX_FACE_PAIRS = 64  # of two blocks, as in face_contacts.c
 
 
 class Surfaces:
@@ -208,7 +209,7 @@ def find_contacts(
     pairs (p, 2): of blocks to be searched, the lower number first; by default all near ones.
     corner_length (m): width of the joint along an edge, at most half of the narrower block.
 
-    Raises ValueError for faces of too many corners.
+    Raises ValueError for faces of too many corners, and too many faces of two blocks in contact.
     """
     if pairs is None:
         pairs = surfaces.near_pairs(reach)
@@ -233,7 +234,10 @@ def find_contacts(
         places = map(address, (pairs, max_gap, max_depth, tie, strip))
         count = surfaces.arrays.call("face_contacts", len(pairs), *places, address(out))
         if count < 0:
-            raise ValueError(f"two faces in contact have more than {MAX_FACE_CORNERS} corners")
+            raise ValueError(
+                f"two faces in contact have more than {MAX_FACE_CORNERS} corners, or two blocks "
+                f"more than {MAX_FACE_PAIRS} pairs of faces in contact"
+            )
         if count <= room:
             break
         room = count

@@ -19,3 +19,11 @@ def columns(path):
     header, *rows = csv.reader(path.read_text().splitlines())
     assert len({*header}) == len(header)
     return dict(zip(header, zip(*rows, strict=True), strict=True))
+
+
+def assign_fractions(joints):
+    """Give the fractions of joints, equal in scenes at rest, three values; returns them."""
+    fractions = {"sliding": 0.25, "slipping": 0.5, "separated": 0.75}
+    for name, value in fractions.items():
+        getattr(joints, name)[:] = value
+    return fractions

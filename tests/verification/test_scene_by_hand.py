@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from by_hand import columns, compare
+from by_hand import assign_fractions, columns, compare
 from scene_text import block, coulomb, lines
 from scipy.linalg import eigh
 
@@ -855,9 +855,7 @@ def test_every_column_of_history(written):
 def test_fractions_of_joints_by_their_names():
     """They are equal in the scenes above."""
     sim = Simulation(parse(Stack.text))
-    fractions = {"sliding": 0.25, "slipping": 0.5, "separated": 0.75}
-    for name, value in fractions.items():
-        getattr(sim.joints, name)[:] = value
+    fractions = assign_fractions(sim.joints)
     joints = _read_joints(sim)
     assert {name: {*joints[name]} for name in fractions} == {
         name: {value} for name, value in fractions.items()

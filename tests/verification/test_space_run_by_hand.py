@@ -15,7 +15,7 @@ import meshio
 import numpy as np
 import pytest
 import test_space_by_hand as overhang
-from by_hand import columns, compare
+from by_hand import assign_fractions, columns, compare
 from scene_text import block, coulomb, lines
 
 from dem_demo.cli import main
@@ -410,9 +410,7 @@ def test_every_column_of_history(written):
 def test_fractions_of_joints_by_their_names():
     """They are equal in the scenes above."""
     sim = SpaceSimulation(parse(Resting.text))
-    fractions = {"sliding": 0.25, "slipping": 0.5, "separated": 0.75}
-    for name, value in fractions.items():
-        getattr(sim.joints, name)[:] = value
+    fractions = assign_fractions(sim.joints)
     joints = read_joints(sim)
     assert {name: [*joints[name]] for name in fractions} == {
         name: 4 * [value] for name, value in fractions.items()
